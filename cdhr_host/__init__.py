@@ -1,0 +1,3 @@
+"""Host software for a cable-driven clay printer."""
+
+__version__ = "0.1.0"
