@@ -1,0 +1,33 @@
+"""TOML -> Profile: what one machine is, in SI, with every key of the file wearing its unit."""
+
+from cdhr_host.profile.schema import (
+    Air,
+    Bed,
+    Drives,
+    Extruder,
+    Forces,
+    Geometry,
+    Limits,
+    Machine,
+    PathRules,
+    Platforms,
+    Profile,
+    Sliders,
+    Spring,
+)
+
+__all__ = [
+    "Air",
+    "Bed",
+    "Drives",
+    "Extruder",
+    "Forces",
+    "Geometry",
+    "Limits",
+    "Machine",
+    "PathRules",
+    "Platforms",
+    "Profile",
+    "Sliders",
+    "Spring",
+]
