@@ -1,5 +1,6 @@
 """TOML -> Profile: what one machine is, in SI, with every key of the file wearing its unit."""
 
+from cdhr_host.profile.load import described, find, profile_names, read_table, validate
 from cdhr_host.profile.schema import (
     Air,
     Bed,
@@ -30,4 +31,9 @@ __all__ = [
     "Profile",
     "Sliders",
     "Spring",
+    "described",
+    "find",
+    "profile_names",
+    "read_table",
+    "validate",
 ]

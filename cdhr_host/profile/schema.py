@@ -14,7 +14,7 @@ from cdhr_host.units import DEG, KPA, MM, MM3, MS, N_MM
 
 def key(name: str, text: str, **bounds: Any) -> Any:
     """The file's key for a field, with its description and its bounds in the file's unit."""
-    return Field(alias=name, description=text, allow_inf_nan=False, strict=False, **bounds)
+    return Field(alias=name, description=text, **bounds)
 
 
 def _to_si(factor: float) -> AfterValidator:
@@ -31,7 +31,7 @@ IN_KPA_S_MM3 = _to_si(KPA / MM3)
 
 
 class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, validate_by_alias=True, validate_by_name=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
 class Machine(_Section):
@@ -45,26 +45,59 @@ class Geometry(_Section):
     """[geometry]: pulleys and platforms, Table A1."""
 
     pulley_circle_radius: Annotated[
-        float, key("pulley_circle_radius_mm", "radius of the circle the pulley centres stand on", gt=0, le=1e5), IN_MM
+        float,
+        key("pulley_circle_radius_mm", "radius of the circle the pulley centres stand on", gt=0, le=1e5),
+        IN_MM,
     ]
-    pulley_radius: Annotated[float, key("pulley_radius_mm", "groove radius of the pulleys", ge=0, le=500), IN_MM]
+    pulley_radius: Annotated[
+        float, key("pulley_radius_mm", "groove radius of the pulleys", ge=0, le=500), IN_MM
+    ]
     lower_pulley_height: Annotated[
-        float, key("lower_pulley_height_mm", "height of the lower pulley centres in W", ge=-1e5, le=1e5), IN_MM
+        float,
+        key("lower_pulley_height_mm", "height of the lower pulley centres in W", ge=-1e5, le=1e5),
+        IN_MM,
     ]
     upper_pulley_height: Annotated[
-        float, key("upper_pulley_height_mm", "height of the upper pulley centres in W", ge=-1e5, le=1e5), IN_MM
+        float,
+        key("upper_pulley_height_mm", "height of the upper pulley centres in W", ge=-1e5, le=1e5),
+        IN_MM,
     ]
     lower_attachment_radius: Annotated[
-        float, key("lower_attachment_radius_mm", "radius of the pair mid-points on the lower platform", ge=0, le=1e4), IN_MM
+        float,
+        key(
+            "lower_attachment_radius_mm", "radius of the pair mid-points on the lower platform", ge=0, le=1e4
+        ),
+        IN_MM,
     ]
     upper_attachment_radius: Annotated[
-        float, key("upper_attachment_radius_mm", "radius of the attachment points on the upper platform", ge=0, le=1e4), IN_MM
+        float,
+        key(
+            "upper_attachment_radius_mm",
+            "radius of the attachment points on the upper platform",
+            ge=0,
+            le=1e4,
+        ),
+        IN_MM,
     ]
     reference_height: Annotated[
-        float, key("reference_height_mm", "height of the lower attachment plane in W at the reference pose", ge=-1e5, le=1e5), IN_MM
+        float,
+        key(
+            "reference_height_mm",
+            "height of the lower attachment plane in W at the reference pose",
+            ge=-1e5,
+            le=1e5,
+        ),
+        IN_MM,
     ]
     reference_separation: Annotated[
-        float, key("reference_separation_mm", "upper attachment plane above the lower one at the reference pose", gt=0, le=1e4), IN_MM
+        float,
+        key(
+            "reference_separation_mm",
+            "upper attachment plane above the lower one at the reference pose",
+            gt=0,
+            le=1e4,
+        ),
+        IN_MM,
     ]
 
 
@@ -78,7 +111,9 @@ class Spring(_Section):
 class Platforms(_Section):
     """[platforms]: what hangs on the cables."""
 
-    lower_mass: Annotated[float, key("lower_mass_kg", "mass of the lower platform with nozzle and clay", gt=0, le=1e3)]
+    lower_mass: Annotated[
+        float, key("lower_mass_kg", "mass of the lower platform with nozzle and clay", gt=0, le=1e3)
+    ]
     upper_mass: Annotated[float, key("upper_mass_kg", "mass of the upper platform", gt=0, le=1e3)]
 
 
@@ -94,40 +129,81 @@ class Forces(_Section):
 class Sliders(_Section):
     """[sliders]: six ball screws; travel counts from the reference pose, positive paid out."""
 
-    screw_lead: Annotated[float, key("screw_lead_mm", "travel of a slider in one motor turn", gt=0, le=1e3), IN_MM]
+    screw_lead: Annotated[
+        float, key("screw_lead_mm", "travel of a slider in one motor turn", gt=0, le=1e3), IN_MM
+    ]
     travel_min: Annotated[float, key("travel_min_mm", "end of travel winding in", ge=-1e5, le=0), IN_MM]
     travel_max: Annotated[float, key("travel_max_mm", "end of travel paying out", ge=0, le=1e5), IN_MM]
     speed_max: Annotated[float, key("speed_max_mm_s", "greatest slider speed", gt=0, le=1e5), IN_MM]
-    acceleration_max: Annotated[float, key("acceleration_max_mm_s2", "greatest slider acceleration", gt=0, le=1e7), IN_MM]
+    acceleration_max: Annotated[
+        float, key("acceleration_max_mm_s2", "greatest slider acceleration", gt=0, le=1e7), IN_MM
+    ]
     jerk_max: Annotated[float, key("jerk_max_mm_s3", "greatest slider jerk", gt=0, le=1e9), IN_MM]
 
 
 class Limits(_Section):
     """[limits]: of the nozzle."""
 
-    speed_max: Annotated[float, key("speed_max_mm_s", "greatest nozzle speed, whatever F says", gt=0, le=1e5), IN_MM]
-    acceleration_max: Annotated[float, key("acceleration_max_mm_s2", "greatest nozzle acceleration", gt=0, le=1e7), IN_MM]
+    speed_max: Annotated[
+        float, key("speed_max_mm_s", "greatest nozzle speed, whatever F says", gt=0, le=1e5), IN_MM
+    ]
+    acceleration_max: Annotated[
+        float, key("acceleration_max_mm_s2", "greatest nozzle acceleration", gt=0, le=1e7), IN_MM
+    ]
     jerk_max: Annotated[float, key("jerk_max_mm_s3", "greatest nozzle jerk", gt=0, le=1e9), IN_MM]
 
 
 class PathRules(_Section):
     """[path]: how exactly the nozzle follows the drawn path."""
 
-    tolerance: Annotated[float, key("tolerance_mm", "greatest deviation from the programmed path", ge=1e-3, le=50), IN_MM]
-    stop_angle: Annotated[float, key("stop_angle_deg", "corners sharper than this are exact stops", gt=0, le=180), IN_DEG]
+    tolerance: Annotated[
+        float, key("tolerance_mm", "greatest deviation from the programmed path", ge=1e-3, le=50), IN_MM
+    ]
+    stop_angle: Annotated[
+        float, key("stop_angle_deg", "corners sharper than this are exact stops", gt=0, le=180), IN_DEG
+    ]
 
 
 class Bed(_Section):
     """[bed]: where programs live in W, and the volume they may use."""
 
-    origin_x: Annotated[float, key("origin_x_mm", "lower platform's x in W when the nozzle is at program 0", ge=-1e5, le=1e5), IN_MM]
-    origin_y: Annotated[float, key("origin_y_mm", "lower platform's y in W when the nozzle is at program 0", ge=-1e5, le=1e5), IN_MM]
-    origin_z: Annotated[float, key("origin_z_mm", "lower platform's z in W when the nozzle is at program 0", ge=-1e5, le=1e5), IN_MM]
-    radius: Annotated[float, key("radius_mm", "radius of the printable cylinder about the program origin", gt=0, le=1e5), IN_MM]
-    height: Annotated[float, key("height_mm", "height of the printable cylinder above the program origin", gt=0, le=1e5), IN_MM]
-    clear_height: Annotated[float, key("clear_height_mm", "how far above the print G28 travels", gt=0, le=1e4), IN_MM]
+    origin_x: Annotated[
+        float,
+        key("origin_x_mm", "lower platform's x in W when the nozzle is at program 0", ge=-1e5, le=1e5),
+        IN_MM,
+    ]
+    origin_y: Annotated[
+        float,
+        key("origin_y_mm", "lower platform's y in W when the nozzle is at program 0", ge=-1e5, le=1e5),
+        IN_MM,
+    ]
+    origin_z: Annotated[
+        float,
+        key("origin_z_mm", "lower platform's z in W when the nozzle is at program 0", ge=-1e5, le=1e5),
+        IN_MM,
+    ]
+    radius: Annotated[
+        float,
+        key("radius_mm", "radius of the printable cylinder about the program origin", gt=0, le=1e5),
+        IN_MM,
+    ]
+    height: Annotated[
+        float,
+        key("height_mm", "height of the printable cylinder above the program origin", gt=0, le=1e5),
+        IN_MM,
+    ]
+    clear_height: Annotated[
+        float, key("clear_height_mm", "how far above the print G28 travels", gt=0, le=1e4), IN_MM
+    ]
     clear_radius: Annotated[
-        float, key("clear_radius_mm", "clay nearer to the reference axis than this keeps G28 from descending", ge=0, le=1e5), IN_MM
+        float,
+        key(
+            "clear_radius_mm",
+            "clay nearer to the reference axis than this keeps G28 from descending",
+            ge=0,
+            le=1e5,
+        ),
+        IN_MM,
     ]
 
 
@@ -135,15 +211,25 @@ class Extruder(_Section):
     """[extruder]: E to clay, clay to air."""
 
     nozzle_diameter: Annotated[float, key("nozzle_diameter_mm", "bore of the nozzle", gt=0, le=100), IN_MM]
-    e_unit: Annotated[Literal["mm", "mm3"], Field(description="E counts millimetres of filament or mm³ (M200 overrides)")]
+    e_unit: Annotated[
+        Literal["mm", "mm3"], Field(description="E counts millimetres of filament or mm³ (M200 overrides)")
+    ]
     filament_diameter: Annotated[
-        float, key("filament_diameter_mm", "diameter of the filament the slicer was told", gt=0, le=100), IN_MM
+        float,
+        key("filament_diameter_mm", "diameter of the filament the slicer was told", gt=0, le=100),
+        IN_MM,
     ]
-    pressure_threshold: Annotated[float, key("pressure_threshold_kpa", "pressure below which no clay flows", ge=0, le=2000), IN_KPA]
+    pressure_threshold: Annotated[
+        float, key("pressure_threshold_kpa", "pressure below which no clay flows", ge=0, le=2000), IN_KPA
+    ]
     pressure_slope: Annotated[
-        float, key("pressure_slope_kpa_s_mm3", "pressure for each mm³/s above the threshold", gt=0, le=1e3), IN_KPA_S_MM3
+        float,
+        key("pressure_slope_kpa_s_mm3", "pressure for each mm³/s above the threshold", gt=0, le=1e3),
+        IN_KPA_S_MM3,
     ]
-    pressure_max: Annotated[float, key("pressure_max_kpa", "greatest pressure of the air supply", gt=0, le=2000), IN_KPA]
+    pressure_max: Annotated[
+        float, key("pressure_max_kpa", "greatest pressure of the air supply", gt=0, le=2000), IN_KPA
+    ]
 
 
 class Air(_Section):
@@ -162,14 +248,24 @@ class Drives(_Section):
 
     period: Annotated[float, key("period_ms", "time between two setpoints", ge=0.25, le=50), IN_MS]
     encoder: Annotated[int, key("encoder_counts", "encoder counts in one motor turn", ge=16, le=2**26)]
-    servo_bandwidth: Annotated[float, key("servo_bandwidth_hz", "bandwidth of the simulated position loop", gt=0, le=1e3)]
-    servo_damping: Annotated[float, Field(description="damping ratio of the simulated position loop", gt=0, le=5)]
-    following_error_max: Annotated[
-        float, key("following_error_max_mm", "slider away from its setpoint that stops the run", gt=0, le=1e3), IN_MM
+    servo_bandwidth: Annotated[
+        float, key("servo_bandwidth_hz", "bandwidth of the simulated position loop", gt=0, le=1e3)
     ]
-    screw_efficiency: Annotated[float, key("screw_efficiency_percent", "efficiency of the ball screws", gt=0, le=100), _to_si(0.01)]
+    servo_damping: Annotated[
+        float, Field(description="damping ratio of the simulated position loop", gt=0, le=5)
+    ]
+    following_error_max: Annotated[
+        float,
+        key("following_error_max_mm", "slider away from its setpoint that stops the run", gt=0, le=1e3),
+        IN_MM,
+    ]
+    screw_efficiency: Annotated[
+        float, key("screw_efficiency_percent", "efficiency of the ball screws", gt=0, le=100), _to_si(0.01)
+    ]
     torque_max: Annotated[float, key("torque_max_nm", "greatest motor torque", gt=0, le=1e3)]
-    regulator_lag: Annotated[float, key("regulator_lag_ms", "time constant of the pressure regulator", ge=0, le=1e4), IN_MS]
+    regulator_lag: Annotated[
+        float, key("regulator_lag_ms", "time constant of the pressure regulator", ge=0, le=1e4), IN_MS
+    ]
 
 
 class Profile(_Section):
