@@ -19,8 +19,7 @@ def test_programs_are_data_only() -> None:
 
 @pytest.mark.parametrize("path", PROGRAMS, ids=lambda path: path.name)
 def test_first_line_of_a_program_says_what_it_is(path: Path) -> None:
-    opened = gzip.open(path, "rb") if path.suffix == ".gz" else path.open("rb")
-    with opened as file:
+    with gzip.open(path, "rb") if path.suffix == ".gz" else path.open("rb") as file:
         first = file.readline(400)
     assert first.startswith(b";")
     assert len(first.strip(b"; \r\n")) > 10

@@ -1,9 +1,11 @@
 """The plan of the house: every module has a floor, every library one door."""
 
+import subprocess
+import sys
 import tomllib
-from importlib.util import find_spec
 
 import pytest
+from importlinter.cli import EXIT_STATUS_SUCCESS, lint_imports
 from looking import PACKAGE, ROOT, dotted, imports, modules
 
 PLAN = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
@@ -31,10 +33,7 @@ def test_pure_rooms_are_all_named_in_the_contract() -> None:
     assert rooms <= set(PURE["source_modules"])
 
 
-@pytest.mark.skipif(find_spec("importlinter") is None, reason="import-linter is not installed")
 def test_the_contracts_hold(monkeypatch: pytest.MonkeyPatch) -> None:
-    from importlinter.cli import EXIT_STATUS_SUCCESS, lint_imports
-
     monkeypatch.chdir(ROOT)
     assert lint_imports(config_filename=str(ROOT / "pyproject.toml"), no_cache=True) == EXIT_STATUS_SUCCESS
 
@@ -64,9 +63,6 @@ def test_a_library_comes_in_by_its_door(library: str, rooms: set[str]) -> None:
 
 def test_command_line_starts_without_the_heavy_libraries() -> None:
     """Importing the command line must not import what only its commands need."""
-    import subprocess
-    import sys
-
     heavy = ("numpy", "scipy", "pyarrow", "pydantic", "rich", "ruckig", "can", "canopen", "serial")
     code = f"import sys, cdhr_host.cli; print([name for name in {heavy!r} if name in sys.modules])"
     run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)

@@ -1,0 +1,1 @@
+"""Logs, summaries and pictures of what was planned and done."""

@@ -1,0 +1,151 @@
+"""Logs on disk: CSV or Parquet by suffix, written as the rows come, visible only when complete."""
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import BinaryIO, Protocol, Self
+
+import pyarrow as pa
+import pyarrow.csv as pa_csv
+import pyarrow.parquet as pq
+
+from cdhr_host.report.columns import FEEDBACK_COLUMNS, SETPOINT_COLUMNS, Column, run_columns, setpoint_columns
+from cdhr_host.values import Feedback, Setpoints
+
+ROW_GROUP = 50_000
+"""Rows held before they are written: 200 s at 250 Hz, some 10 MB."""
+
+
+class LogTargetError(ValueError):
+    """A log cannot be written there; the message says why and what would do."""
+
+
+def _type(name: str) -> pa.DataType:
+    return pa.int64() if name == "line" or name.endswith("_counts") else pa.float64()
+
+
+class _Writer(Protocol):
+    def write(self, table: pa.Table) -> None: ...
+
+    def close(self) -> None: ...
+
+
+class _Csv:
+    """Shortest decimals that read back to the same bits; names without quotes."""
+
+    def __init__(self, file: BinaryIO, schema: pa.Schema) -> None:
+        self._file = file
+        file.write((",".join(schema.names) + "\n").encode())
+
+    def write(self, table: pa.Table) -> None:
+        pa_csv.write_csv(table, self._file, pa_csv.WriteOptions(include_header=False))
+
+    def close(self) -> None:
+        """The file is the log's to close."""
+
+
+class _Parquet:
+    """Split into byte streams before compression: doubles pack well so."""
+
+    def __init__(self, file: BinaryIO, schema: pa.Schema) -> None:
+        doubles = [field.name for field in schema if pa.types.is_float64(field.type)]
+        self._writer = pq.ParquetWriter(
+            file, schema, compression="zstd", use_dictionary=False, use_byte_stream_split=doubles
+        )
+
+    def write(self, table: pa.Table) -> None:
+        self._writer.write_table(table)
+
+    def close(self) -> None:
+        self._writer.close()
+
+
+WRITERS: dict[str, Callable[[BinaryIO, pa.Schema], _Writer]] = {".csv": _Csv, ".parquet": _Parquet}
+
+
+def check_target(path: Path) -> None:
+    """Refuse a log that could not be written there, before any work is done; raises LogTargetError."""
+    if path.suffix not in WRITERS:
+        known = " or ".join(WRITERS)
+        raise LogTargetError(f"'{path.name}' does not end in {known}: the suffix says which kind to write")
+    if path.exists() and not path.is_file():
+        raise LogTargetError(f"{path} is not a regular file")
+    if not path.parent.is_dir():
+        raise LogTargetError(f"there is no folder {path.parent}")
+    if not os.access(path.parent, os.W_OK):
+        raise LogTargetError(f"no permission to write in {path.parent}")
+
+
+class Log:
+    """A log being written beside its target; ``keep`` puts it in place, leaving without it drops it.
+
+    A context manager. Rows are columns of equal length, in the order of ``names``. Memory
+    is bounded by ROW_GROUP rows. Raises LogTargetError at construction, OSError when the disk
+    refuses.
+    """
+
+    def __init__(self, path: Path, names: Sequence[str] = SETPOINT_COLUMNS) -> None:
+        check_target(path)
+        self._path = path
+        self._part = path.with_name(f".{path.name}.{os.getpid()}.part")
+        self._schema = pa.schema([(name, _type(name)) for name in names])
+        self._held: list[pa.RecordBatch] = []
+        self._rows = 0
+        self._file: BinaryIO = self._part.open("wb")
+        self._writer: _Writer = WRITERS[path.suffix](self._file, self._schema)
+
+    def add(self, columns: dict[str, Column]) -> None:
+        """Append rows: {column: (N,)}."""
+        batch = pa.record_batch([columns[name] for name in self._schema.names], schema=self._schema)
+        self._held.append(batch)
+        self._rows += batch.num_rows
+        if self._rows >= ROW_GROUP:
+            self._flush()
+
+    def _flush(self) -> None:
+        if self._rows:
+            self._writer.write(pa.Table.from_batches(self._held, self._schema).combine_chunks())
+        self._held, self._rows = [], 0
+
+    def keep(self) -> None:
+        """Write what is held, and put the log in its place."""
+        self._flush()
+        self._writer.close()
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self._file.close()
+        self._part.replace(self._path)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            self._file.close()
+        finally:
+            self._part.unlink(missing_ok=True)
+
+
+class SetpointLog(Log):
+    """The setpoints of a dry run, one row a tick."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, SETPOINT_COLUMNS)
+
+    def add_setpoints(self, setpoints: Setpoints) -> None:
+        """Append N ticks."""
+        self.add(setpoint_columns(setpoints))
+
+
+class RunLog(Log):
+    """What was sent and what came back, one row an executed tick."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, SETPOINT_COLUMNS + FEEDBACK_COLUMNS)
+
+    def add_run(self, setpoints: Setpoints, feedback: Feedback) -> None:
+        """Append N executed ticks."""
+        self.add(run_columns(setpoints, feedback))
