@@ -1,0 +1,84 @@
+"""What every way to the drives offers."""
+
+from enum import Enum
+from typing import Protocol
+
+from cdhr_host.profile.schema import Profile
+from cdhr_host.values import Array, Feedback, Setpoints
+
+
+class LinkState(Enum):
+    """Where a link is in its life."""
+
+    CLOSED = "closed"
+    OPEN = "open"
+    """the far side answers, nothing may move"""
+    ARMED = "armed"
+    """holding position, setpoints are buffered, none is executed yet"""
+    RUNNING = "running"
+    """executing setpoints, or standing at rest after the last one"""
+    STOPPING = "stopping"
+    """coming to rest on the path, air off"""
+    STOPPED = "stopped"
+    """at rest, air off; may be armed again"""
+    FAULT = "fault"
+    """at rest, air off, after a fault; only closing helps"""
+
+
+class MachineLink(Protocol):
+    """A buffered far side: absolute ticks in, feedback of executed ticks out.
+
+    A link whose drives take one setpoint a cycle keeps its buffer in its own sender. Calls
+    raise DriveError. A fault of the far side is raised by the next ``feed`` or ``feedback``
+    after it; from then on ``feed`` refuses, and ``feedback`` gives the rows of the stop.
+    ``state``, ``free``, ``buffered`` and ``stop_tick`` are as of the last call.
+    """
+
+    @property
+    def profile(self) -> Profile:
+        """The machine at the far side."""
+        ...
+
+    @property
+    def state(self) -> LinkState:
+        """Where the link is in its life."""
+        ...
+
+    @property
+    def free(self) -> int:
+        """Rows that ``feed`` would accept."""
+        ...
+
+    @property
+    def buffered(self) -> int:
+        """Rows accepted and not executed yet."""
+        ...
+
+    @property
+    def stop_tick(self) -> int | None:
+        """First tick of the path-true stop (``motion.hold``) since arming; None when there is none."""
+        ...
+
+    def open(self) -> None:
+        """CLOSED -> OPEN: find the drives."""
+        ...
+
+    def arm(self, start: Array) -> None:
+        """OPEN or STOPPED -> ARMED: hold position, without a bump. (6,) m, where the sliders stand."""
+        ...
+
+    def feed(self, setpoints: Setpoints) -> int:
+        """Buffer the first rows there is credit for; how many. Checks all rows before it takes any."""
+        ...
+
+    def feedback(self) -> Feedback:
+        """What was executed since the last call; may be of no row."""
+        ...
+
+    def stop(self) -> None:
+        """Come to rest on the path within what was fed, air off. Harmless when nothing moves."""
+        ...
+
+    def close(self) -> None:
+        """-> CLOSED; what moves is stopped on the path first."""
+        ...

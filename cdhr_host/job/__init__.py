@@ -1,0 +1,6 @@
+"""One print: setpoints to the drives, feedback to the log."""
+
+from cdhr_host.job.stream import Streamer, stream
+from cdhr_host.job.tally import RunSummary
+
+__all__ = ["RunSummary", "Streamer", "stream"]
