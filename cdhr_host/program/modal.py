@@ -1,0 +1,94 @@
+"""Modal state of a program as one frozen value, and what its comments tell."""
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from cdhr_host.units import MM, MM3
+
+Point = tuple[float, float, float]
+
+GRID_DIGITS: Final = 12
+"""Positions are kept on a grid of one picometre, so that the rounding left by G91 and G92
+cannot become a move."""
+CLAY_LEAST: Final = 1e-7 * MM3
+"""m³; a step of E below this is the rounding of the file's decimals, not clay."""
+
+
+@dataclass(frozen=True, slots=True)
+class Metadata:
+    """The latest of what the slicer says in comments; None where it has not said it."""
+
+    flavour: str | None = None
+    """G-code dialect the slicer was set to (``;FLAVOR:``)"""
+    layers: int | None = None
+    """layers announced (``;LAYER_COUNT:``)"""
+    feature: str | None = None
+    """what is being printed (``;TYPE:``)"""
+    width: float | None = None
+    """m, of the bead (``;WIDTH:``)"""
+    height: float | None = None
+    """m, of the layer (``;HEIGHT:``)"""
+    z: float | None = None
+    """m, of the layer (``;Z:``)"""
+
+
+@dataclass(frozen=True, slots=True)
+class Modal:
+    """What a line inherits from the lines before it."""
+
+    position: Point
+    """m, the nozzle in G"""
+    offset: Point = (0.0, 0.0, 0.0)
+    """m, what G92 adds to programmed numbers"""
+    e: float = 0.0
+    """programmed E, in mm of filament or in mm³"""
+    unit: float = MM
+    """m in one programmed X, Y, Z, I, J, R, F (G20, G21)"""
+    absolute: bool = True
+    """X Y Z (G90, G91)"""
+    absolute_e: bool = True
+    """E (M82, M83)"""
+    feed: float | None = None
+    """m/s, None before the first F"""
+    volumetric: bool = False
+    """E counts mm³ (M200, profile)"""
+    filament_diameter: float = 1e-3
+    """m, what a linear E is of"""
+    speed_factor: float = 1.0
+    """M220"""
+    flow_factor: float = 1.0
+    """M221"""
+    debt: float = 0.0
+    """m³ taken back by negative E and not yet given again"""
+    air: float = 0.0
+    """Pa held by air words"""
+    top: float = -math.inf
+    """m, the highest the nozzle was while it laid clay"""
+    near: float = math.inf
+    """m, the nearest it came to the reference axis while it laid clay"""
+    layer: int = 0
+    """layers begun"""
+    layer_mark: str = ""
+    """the comment that marks layers in this program"""
+    warned: frozenset[str] = frozenset()
+    """warnings already given"""
+    ended: bool = False
+    """M2 or M30 was read"""
+    lines: int = 0
+    """lines read"""
+    metadata: Metadata = Metadata()
+
+    @property
+    def e_unit(self) -> float:
+        """mm of filament, or mm³, in one programmed E; in inches as Marlin has it."""
+        return (self.unit / MM) ** (3 if self.volumetric else 1)
+
+    @property
+    def clay_per_e(self) -> float:
+        """m³ of clay in 1 mm of filament, or in 1 mm³."""
+        return MM3 if self.volumetric else MM * math.pi / 4 * self.filament_diameter**2
+
+    def flow(self, feed: float) -> float:
+        """m³/s of an E that is alone in its line, with F as its rate."""
+        return feed / MM * self.clay_per_e * self.speed_factor
