@@ -1,0 +1,1 @@
+"""Commands -> time: the smoothed path, the speed along it, and samples on the drives' ticks."""

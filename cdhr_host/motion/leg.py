@@ -1,0 +1,153 @@
+"""A leg: a stretch of path run without stopping, planned while it is still being drawn.
+
+Segments are collected until there are enough to plan. What is planned is committed up to
+the last border whose speed no further path can raise; the rest is planned again together
+with what follows. So memory stays bounded however long a leg is, and the result does not
+depend on when segments arrived.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdhr_host.errors import MotionError, Problem
+from cdhr_host.motion.limits import Cells, MotionLimits, cells
+from cdhr_host.motion.look_ahead import border_speeds
+from cdhr_host.motion.smooth_path import SmoothPath, smooth
+from cdhr_host.motion.time_law import TimeLaw, time_law
+from cdhr_host.units import MM
+from cdhr_host.values import Array, Flags, Ints
+
+BATCH = 2048
+"""Segments collected before a plan is made."""
+
+
+@dataclass(frozen=True, slots=True)
+class Segments:
+    """M drawn segments in a row, of positive length."""
+
+    points: Array
+    """(M+1, 3) m"""
+    line: Ints
+    """(M,) source line"""
+    feed: Array
+    """(M,) m/s"""
+    clay: Array
+    """(M,) m³ for each metre of path"""
+    air: Array
+    """(M,) Pa held by air words"""
+
+    def __len__(self) -> int:
+        return len(self.line)
+
+    def part(self, first: int, last: int) -> "Segments":
+        """Segments first to last - 1."""
+        return Segments(
+            self.points[first : last + 1],
+            self.line[first:last],
+            self.feed[first:last],
+            self.clay[first:last],
+            self.air[first:last],
+        )
+
+    def joined(self, other: "Segments") -> "Segments":
+        """These, then the others, which begin where these end."""
+        return Segments(
+            np.concatenate((self.points, other.points[1:])),
+            np.concatenate((self.line, other.line)),
+            np.concatenate((self.feed, other.feed)),
+            np.concatenate((self.clay, other.clay)),
+            np.concatenate((self.air, other.air)),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A committed stretch: its path, the time law along it, and what the segments carry."""
+
+    path: SmoothPath
+    law: TimeLaw
+    segments: Segments
+
+    @property
+    def duration(self) -> float:
+        """s"""
+        return self.law.duration
+
+
+class LegPlanner:
+    """Collects the segments of one leg and commits what is settled."""
+
+    def __init__(self, limits: MotionLimits) -> None:
+        self._limits = limits
+        self._segments: Segments | None = None
+        self._planned = 0
+        self._opens = True
+        self._first = -limits.half_width
+        self._entry: float | None = None
+        self._inside = False
+
+    def add(self, segments: Segments) -> None:
+        """Draw on; the segments begin where the last ones ended."""
+        self._segments = segments if self._segments is None else self._segments.joined(segments)
+
+    @property
+    def due(self) -> bool:
+        """Whether enough has been drawn since the last plan to make another."""
+        return self._segments is not None and len(self._segments) - self._planned >= BATCH
+
+    def plan(self, *, closes: bool) -> Leg | None:
+        """What can be committed; everything if the leg closes here. None if nothing is settled."""
+        segments = self._segments
+        if segments is None:
+            return None
+        path = smooth(segments.points, self._limits.half_width, opens=self._opens, closes=closes)
+        last = path.end if closes else path.end - self._limits.half_width
+        self._planned = len(segments)
+        if last <= self._first:
+            return None
+        span = (self._first, last)
+        found = cells(path, segments.feed[path.segment], span, self._limits, inside=self._inside)
+        speeds, forward = border_speeds(found, self._entry, None if closes else 0.0)
+        self._check_entry(speeds[0])
+        count = len(found.start) if closes else _settled(found, speeds == forward)
+        if count == 0:
+            return None
+        leg = Leg(path, time_law(found.first(count), speeds[: count + 1]), segments)
+        if not closes:
+            self._advance(found, count, float(speeds[count]))
+        return leg
+
+    def _advance(self, found: Cells, count: int, speed: float) -> None:
+        """Forget what is committed, but for the path the kernel still reaches back to."""
+        segments = self._segments
+        assert segments is not None
+        border = float(found.start[count])
+        steps = np.diff(segments.points, axis=0)
+        drawn = np.concatenate(([0.0], np.cumsum(np.sqrt(np.einsum("nk,nk->n", steps, steps)))))
+        reach = border - self._limits.half_width
+        first = max(int(np.searchsorted(drawn, reach, side="right")) - 1, 0)
+        self._segments = segments.part(first, len(segments))
+        self._planned = len(self._segments)
+        self._opens = self._opens and first == 0
+        self._first = border - drawn[first]
+        self._entry = speed
+        self._inside = bool(found.bent[count])
+
+    def _check_entry(self, speed: float) -> None:
+        if self._entry is not None and speed < self._entry * (1 - 1e-9):
+            assert self._segments is not None
+            raise MotionError(
+                Problem(
+                    "unplannable",
+                    f"cannot slow down from {self._entry / MM:.6g} to {speed / MM:.6g} mm/s in time",
+                    line=int(self._segments.line[0]),
+                    hint="please report this as a bug, with the program",
+                )
+            )
+
+
+def _settled(found: Cells, final: Flags) -> int:
+    """How many cells can be committed: up to the last border that nothing further can change."""
+    usable = np.flatnonzero(final[:-1] & (found.start < found.settled))
+    return int(usable[-1]) if len(usable) else 0

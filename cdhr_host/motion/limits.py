@@ -1,0 +1,216 @@
+"""What bounds the speed: the profile's limits, applied to stretches of the path.
+
+With the path q(s) and the time law s(t), the nozzle has
+
+    velocity      q' s'
+    acceleration  q'' s'² + q' s''
+    jerk          q''' s'³ + 3 q'' s' s'' + q' s'''
+
+and |q'| <= 1. A cell is a stretch of path with one set of bounds on s', s'' and s''' such
+that the nozzle's limits hold whatever the time law does inside them: a straight cell gives
+the whole budget to s'' and s'''; a bent one keeps most of it for the bend.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdhr_host.errors import MotionError, Problem
+from cdhr_host.motion.smooth_path import SmoothPath
+from cdhr_host.profile import Profile
+from cdhr_host.units import MM
+from cdhr_host.values import Array, Flags, Ints
+
+SHARES = (0.9, 0.75, 0.5, 0.25, 0.1)
+"""Shares of the budget a bent cell may spend on changing speed, tried in this order."""
+NEARLY = 0.97
+"""A share is good enough when it keeps this part of the speed the cell would otherwise allow."""
+LONG_RUN = 4.0
+"""A bend longer than this many half-widths must let the speed change inside it."""
+CELL = 2.0
+"""Length of the cells of a long bend, in half-widths."""
+NEWTON_STEPS = 6
+"""From the nearer of two bounds, less than 1.5 times the root, these reach it to rounding."""
+MERGE = 0.1
+"""m, cells are merged up to this length, so that a long path has borders to stop at."""
+CHORD_ERROR = 1e-6
+"""m, how far the chords that stand for an arc may be from it."""
+
+
+def _too_slow_sliders(speed: float) -> Problem:
+    return Problem(
+        "unplannable",
+        f"at {speed / MM:g} mm/s the cables' turning alone exceeds the sliders' acceleration or jerk limit",
+        key="limits.speed_max_mm_s",
+        value=speed / MM,
+        hint="lower limits.speed_max_mm_s, or raise the sliders' acceleration_max and jerk_max",
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class MotionLimits:
+    """Bounds on the nozzle, with the sliders' folded in, and the smoothing that goes with them."""
+
+    speed: float
+    """m/s"""
+    acceleration: float
+    """m/s²"""
+    jerk: float
+    """m/s³"""
+    half_width: float
+    """m, of the smoothing kernel"""
+    stop_angle: float
+    """rad, a corner turning more than this is an exact stop"""
+
+    @classmethod
+    def from_profile(cls, profile: Profile, bend: float) -> "MotionLimits":
+        """Nozzle limits under which the sliders' limits hold too.
+
+        ``bend`` (1/m) bounds, over the bed, how much a cable's direction turns for each metre
+        of nozzle travel, g = 1/L + cos(theta)/rho. With l' = -e·v and |e| = 1:
+        |l'| <= v, |l''| <= a + g v², |l'''| <= j + 3 g a v + 6 g² v³.
+        Raises MotionError where that leaves nothing for the nozzle.
+        """
+        limits, sliders = profile.limits, profile.sliders
+        v = min(limits.speed_max, sliders.speed_max)
+        a = min(limits.acceleration_max, sliders.acceleration_max - bend * v**2)
+        j = min(limits.jerk_max, sliders.jerk_max - 3 * bend * v * a - 6 * bend**2 * v**3)
+        if a <= 0.0 or j <= 0.0:
+            raise MotionError(_too_slow_sliders(v))
+        # The kernel deviates by a third of its half-width; a micrometre is left for arcs' chords.
+        h = 3.0 * (profile.path.tolerance - CHORD_ERROR)
+        return cls(v, a, j, h, profile.path.stop_angle)
+
+
+@dataclass(frozen=True, slots=True)
+class Cells:
+    """K stretches of path in order, each with bounds on ds/dt and its derivatives."""
+
+    start: Array
+    """(K,) m in s"""
+    length: Array
+    """(K,) m in s"""
+    speed: Array
+    """(K,) m/s, greatest s'"""
+    acceleration: Array
+    """(K,) m/s², greatest |s''|; 0 where the speed must stay constant"""
+    jerk: Array
+    """(K,) m/s³, greatest |s'''|; 0 where the speed must stay constant"""
+    settled: float
+    """m in s: cells before it keep their bounds whatever path follows"""
+    bent: Flags
+    """(K,) whether the cell lies in a long bend"""
+
+    def first(self, count: int) -> "Cells":
+        """The first cells only."""
+        return Cells(
+            self.start[:count],
+            self.length[:count],
+            self.speed[:count],
+            self.acceleration[:count],
+            self.jerk[:count],
+            self.settled,
+            self.bent[:count],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Pieces:
+    """Path pieces between two places, with what bounds the speed on them."""
+
+    start: Array
+    length: Array
+    feed: Array
+    bend: Array
+    change: Array
+    bent: Flags
+
+
+def cells(
+    path: SmoothPath, feed: Array, span: tuple[float, float], limits: MotionLimits, *, inside: bool
+) -> Cells:
+    """Cells of a path over a span of s.
+
+    ``feed`` (K,) m/s is the programmed speed on each piece; ``inside`` says that the span
+    begins inside a long bend begun earlier.
+    """
+    pieces = _between(path, feed, span)
+    group, roomy = _groups(pieces, limits.half_width, inside=inside)
+    heads = np.flatnonzero(np.diff(group, prepend=group[0] - 1))
+    cap = np.minimum(np.minimum.reduceat(pieces.feed, heads), limits.speed)
+    bend = np.maximum.reduceat(pieces.bend, heads)
+    change = np.maximum.reduceat(pieces.change, heads)
+    speed, share = _budget(cap, bend, change, roomy[heads], limits)
+    settled = pieces.start[heads[-1]] if pieces.bent[-1] else span[1]
+    merged = _merge_heads(pieces.start[heads], speed, share)
+    length = np.add.reduceat(np.add.reduceat(pieces.length, heads), merged)
+    heads, share = heads[merged], share[merged]
+    a, j = share * limits.acceleration, share * limits.jerk
+    return Cells(pieces.start[heads], length, speed[merged], a, j, float(settled), roomy[heads])
+
+
+def _between(path: SmoothPath, feed: Array, span: tuple[float, float]) -> _Pieces:
+    """The pieces of a path that lie in a span of s, cut at its ends."""
+    ends = np.append(path.start[1:], path.end)
+    used = np.flatnonzero((ends > span[0]) & (path.start < span[1]))
+    start = np.maximum(path.start[used], span[0])
+    bend, change = (bound[used] for bound in path.bounds())
+    length = np.minimum(ends[used], span[1]) - start
+    return _Pieces(start, length, feed[used], bend, change, path.bending[used] > 0)
+
+
+def _groups(pieces: _Pieces, h: float, *, inside: bool) -> tuple[Ints, Flags]:
+    """(K,) cell number of each piece, and whether its bend is long.
+
+    A short bend is one cell, a long one many; straights split where the feed changes.
+    """
+    bent, start = pieces.bent, pieces.start
+    run = np.cumsum(np.diff(bent, prepend=bent[0]) != 0)
+    heads = np.flatnonzero(np.diff(run, prepend=-1))
+    run_length = np.add.reduceat(pieces.length, heads)[run]
+    roomy = bent & (run_length > LONG_RUN * h)
+    if inside:
+        roomy |= bent & (run == 0)
+    part = np.where(roomy, np.floor((start - start[heads][run]) / (CELL * h)), 0.0)
+    part = np.where(bent, part, np.cumsum(np.diff(pieces.feed, prepend=pieces.feed[0]) != 0))
+    change = (np.diff(run, prepend=run[0]) != 0) | (np.diff(part, prepend=part[0]) != 0)
+    return np.cumsum(change), roomy
+
+
+def _budget(
+    cap: Array, bend: Array, change: Array, roomy: Flags, limits: MotionLimits
+) -> tuple[Array, Array]:
+    """(K,) speed and share of the acceleration and jerk budget each cell may spend on s'' and s'''."""
+    straight = bend == 0
+    steady = np.minimum(cap, _bend_speed(bend, change, 0.0, limits))
+    speed, share = steady, np.where(straight, 1.0, 0.0)
+    undecided = ~straight
+    for candidate in SHARES:
+        reached = np.minimum(cap, _bend_speed(bend, change, candidate, limits))
+        last = roomy if candidate == SHARES[-1] else np.zeros_like(roomy)
+        good = undecided & ((reached >= NEARLY * steady) | last)
+        speed, share = np.where(good, reached, speed), np.where(good, candidate, share)
+        undecided &= ~good
+    return speed, share
+
+
+def _bend_speed(bend: Array, change: Array, share: float, limits: MotionLimits) -> Array:
+    """(K,) m/s: greatest s' in a bend when ``share`` of the budgets goes to s'' and s'''.
+
+    |q''| v² + share A <= A, and |q'''| v³ + 3 |q''| v share A + share J <= J, whose rising
+    convex cubic Newton's method solves from above.
+    """
+    linear, rest = 3 * bend * share * limits.acceleration, (1 - share) * limits.jerk
+    with np.errstate(divide="ignore", invalid="ignore"):
+        by_acceleration = np.sqrt((1 - share) * limits.acceleration / bend)
+        root = np.minimum(np.cbrt(rest / change), rest / linear)
+        for _ in range(NEWTON_STEPS if share else 0):
+            root -= (change * root**3 + linear * root - rest) / (3 * change * root**2 + linear)
+    return np.fmin(by_acceleration, root)
+
+
+def _merge_heads(start: Array, speed: Array, share: Array) -> Ints:
+    """First of each row of neighbouring cells with the same bounds, none longer than MERGE."""
+    differs = (np.diff(speed, prepend=-1.0) != 0) | (np.diff(share, prepend=-1.0) != 0)
+    stretch = np.floor((start - start[0]) / MERGE)
+    return np.flatnonzero(differs | (np.diff(stretch, prepend=-1.0) != 0))

@@ -1,0 +1,127 @@
+"""The nozzle's path: the drawn polyline, smoothed to a curve with continuous curvature.
+
+The polyline p(s), by its arc length s, is convolved with a triangular kernel of half-width
+h: q(s) = integral K(u) p(s - u) du, K(u) = (h - |u|)/h². The result is a cubic spline in s:
+
+* q, q' and q'' are continuous; q''(s) = sum over corners k of (d[k+1] - d[k]) K(s - s[k]),
+  with d the unit direction of each segment, so curvature and its change stay bounded;
+* |q'| <= 1, since q' is an average of unit vectors: a rate ds/dt never exceeds the nozzle
+  speed it stands for;
+* |q(s) - p(s)| <= integral K(u)|u| du = h/3, since p is 1-Lipschitz: the nozzle deviates by
+  at most h/3 from the drawn path, and passes within h/3 of each of its points.
+
+Chords of a curve are smoothed together because the kernel spans them; a line stays a line.
+An exact stop is one more corner, from or to direction zero: there the curve starts or ends
+at rest in s itself (q' = q'' = 0), h before the first and h after the last point.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdhr_host.values import Array, Ints
+
+STRAIGHT = 1e-9
+"""Direction changes below this (rad) are no corners."""
+
+
+@dataclass(frozen=True, slots=True)
+class SmoothPath:
+    """K cubic pieces: q(s) = c[0] + c[1] x + c[2] x²/2 + c[3] x³/6 with x = s - start."""
+
+    start: Array
+    """(K,) m, where each piece begins, ascending"""
+    end: float
+    """m, where the last piece ends"""
+    coefficients: Array
+    """(4, K, 3) q, q', q'', q''' at the start of each piece"""
+    segment: Ints
+    """(K,) drawn segment each piece follows"""
+    bending: Ints
+    """(K,) corners whose kernel reaches into the piece; 0 where the path is straight"""
+
+    def lengths(self) -> Array:
+        """(K,) m: length in s of each piece."""
+        return np.diff(self.start, append=self.end)
+
+    def bounds(self) -> tuple[Array, Array]:
+        """((K,), (K,)): greatest |q''| (1/m) and |q'''| (1/m²) within each piece."""
+        second = self.coefficients[2]
+        after = second + self.coefficients[3] * self.lengths()[:, None]
+        largest = np.maximum(_norm(second), _norm(after))
+        bent = self.bending > 0
+        return np.where(bent, largest, 0.0), np.where(bent, _norm(self.coefficients[3]), 0.0)
+
+    def at(self, s: Array) -> tuple[Ints, Array, Array, Array]:
+        """(N,) -> piece (N,), q, q', q'' (N, 3) each."""
+        piece = np.clip(np.searchsorted(self.start, s, side="right") - 1, 0, len(self.start) - 1)
+        x = (s - self.start[piece])[:, None]
+        c0, c1, c2, c3 = self.coefficients[:, piece]
+        return (
+            piece,
+            c0 + x * (c1 + x * (c2 / 2 + x * (c3 / 6))),
+            c1 + x * (c2 + x * (c3 / 2)),
+            c2 + x * c3,
+        )
+
+
+def smooth(points: Array, h: float, *, opens: bool, closes: bool) -> SmoothPath:
+    """(M+1, 3) m: the smoothed path of a polyline with M segments of positive length.
+
+    ``opens`` and ``closes`` say whether the polyline starts and ends at rest. Where it does
+    not, it is part of a longer one, and the result is exact only from h after the first
+    point to h before the last. Pieces begin at s = -h, and end at the last point, or h
+    after it where the polyline closes.
+    """
+    steps = np.diff(points, axis=0)
+    lengths = _norm(steps)
+    drawn = np.concatenate(([0.0], np.cumsum(lengths)))
+    corner_s, turn = _corners(drawn, steps / lengths[:, None], opens=opens, closes=closes)
+    last = drawn[-1] + h if closes else drawn[-1]
+    knots, third, bending = _knots(corner_s, turn, h, last, drawn)
+    widths = np.diff(knots, append=last)[:, None]
+    second = _before(third * widths)
+    second[bending == 0] = 0.0
+    initial = np.zeros(3) if opens else steps[0] / lengths[0]
+    slope = initial + _before(second * widths + third * widths**2 / 2)
+    increments = slope * widths + second * widths**2 / 2 + third * widths**3 / 6
+    value = points[0] - h * initial + _before(increments)
+    segment = np.clip(np.searchsorted(drawn, knots, side="right") - 1, 0, len(lengths) - 1)
+    coefficients = np.stack((value, slope, second, third))
+    return SmoothPath(knots, float(last), coefficients, segment, bending)
+
+
+def _corners(drawn: Array, direction: Array, *, opens: bool, closes: bool) -> tuple[Array, Array]:
+    """Where the direction changes, and by which vector."""
+    rest = np.zeros((1, 3))
+    around = np.concatenate((rest if opens else direction[:1], direction, rest if closes else direction[-1:]))
+    turn = np.diff(around, axis=0)
+    bends = _norm(turn) > STRAIGHT
+    return drawn[bends], turn[bends]
+
+
+def _knots(corner: Array, turn: Array, h: float, last: float, drawn: Array) -> tuple[Array, Array, Ints]:
+    """Piece starts (K,), q''' on each (K, 3), and how many kernels reach into it (K,)."""
+    at = np.concatenate((corner - h, corner, corner + h, drawn[:-1], [-h]))
+    jump = np.zeros((len(at), 3))
+    count = np.zeros(len(at), dtype=np.int64)
+    n = len(corner)
+    jump[:n], jump[n : 2 * n], jump[2 * n : 3 * n] = turn / h**2, -2 * turn / h**2, turn / h**2
+    count[:n], count[2 * n : 3 * n] = 1, -1
+    order = np.argsort(at, kind="stable")
+    at = np.clip(at[order], -h, last)
+    third, active = np.cumsum(jump[order], axis=0), np.cumsum(count[order])
+    keep = np.diff(at, append=last) > 0
+    third[active == 0] = 0.0
+    return at[keep], third[keep], active[keep]
+
+
+def _before(increments: Array) -> Array:
+    """Running sum of all earlier rows."""
+    return np.concatenate((np.zeros((1, increments.shape[1])), np.cumsum(increments, axis=0)[:-1]))
+
+
+def _norm(vectors: Array) -> Array:
+    """(N, 3) -> (N,)."""
+    lengths: Array = np.sqrt(np.einsum("nk,nk->n", vectors, vectors))
+    return lengths
