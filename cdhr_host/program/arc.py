@@ -16,6 +16,7 @@ from cdhr_host.errors import Problem
 from cdhr_host.program.block import Block
 from cdhr_host.program.modal import GRID_DIGITS, Modal
 from cdhr_host.program.run import Run, missing_feed
+from cdhr_host.program.straight import row_of
 from cdhr_host.units import MM
 from cdhr_host.values import Arc
 
@@ -47,8 +48,7 @@ def arc(run: Run, block: Block) -> None:
         run.refuse(missing_feed(block.line, block.column))
     run.unfed = False
     digits = {word.letter: word.digits for word in block.words}
-    row = ("1", *(digits.get(letter, "") for letter in "FXYZE"), "")
-    steps, speed = run.step(row, block.line)
+    steps, speed = run.step(row_of("G1", digits), block.line)
     before, end = run.modal.position, steps.modal.position
     try:
         centre = _centre(block, run.modal, before, end)

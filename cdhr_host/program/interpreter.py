@@ -19,8 +19,8 @@ from cdhr_host.values import Array, Command
 _NUMBER: Final = r"([-+]?(?:[0-9]{1,9}+(?:\.[0-9]{0,15}+)?|\.[0-9]{1,15}+))"
 _SPEED: Final = r" ++F((?=[0-9.]*[1-9])(?:[0-9]{1,9}+(?:\.[0-9]{0,15}+)?|\.[0-9]{1,15}+))"
 _LINE: Final = re.compile(
-    rf"(?:G0?([01])(?:{_SPEED})?(?: ++X{_NUMBER})?(?: ++Y{_NUMBER})?(?: ++Z{_NUMBER})?(?: ++E{_NUMBER})?"
-    rf"(?(2)|(?:{_SPEED})?) *+(?:;[^\n]*+)?|([^\n]*+))\n"
+    rf"(?:G0?([01])(?:{_SPEED})?(?: ++Z{_NUMBER})?(?: ++X{_NUMBER})?(?: ++Y{_NUMBER})?"
+    rf"(?(3)|(?: ++Z{_NUMBER})?)(?: ++E{_NUMBER})?(?(2)|(?:{_SPEED})?) *+(?:;[^\n]*+)?|([^\n]*+))\n"
 )
 """Every line is one match: the columns of a plain G0 or G1 as slicers write it, or the whole
 line as the last group, for the parser."""
@@ -102,7 +102,7 @@ def _piece(run: Run, piece: Piece) -> bool:
         if first < at:
             _straight(run, found, first, at, piece.first_line)
         if at < len(found):
-            seen = _line(run, found[at][7], piece.first_line + at) or seen
+            seen = _line(run, found[at][-1], piece.first_line + at) or seen
         first = at + 1
     return seen
 

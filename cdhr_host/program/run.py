@@ -7,7 +7,7 @@ from cdhr_host.errors import MAX_LISTED, Problem
 from cdhr_host.profile.schema import Profile
 from cdhr_host.program.block import Block
 from cdhr_host.program.modal import Modal
-from cdhr_host.program.straight import BATCH, Row, Steps, interpret, resolve
+from cdhr_host.program.straight import BATCH, Row, Steps, has_feed, has_travel, interpret, resolve
 from cdhr_host.units import MM
 from cdhr_host.values import Command, Moves, Notice
 
@@ -96,7 +96,7 @@ class Run:
                 at = int(command.speed.argmax())
                 self._warn_fast(int(command.line[at]), float(command.speed[at]))
             self._put([command])
-        self.lost = self.lost and not (any(row[2] for row in rows) and any(row[3] for row in rows))
+        self.lost = self.lost and not (any(row[3] for row in rows) and any(row[4] for row in rows))
 
     def _warn_fast(self, line: int, speed: float) -> None:
         limit = self.profile.limits.speed_max
@@ -111,9 +111,8 @@ class Run:
     def _need_feed(self, rows: Sequence[Row], lines: Sequence[int], column: int) -> None:
         """Refuse the first row that needs an F when none was given; only that one."""
         for row, line in zip(rows, lines, strict=True):
-            moves = any(row[2:5])
-            needed = moves if row[0] == "1" else row[5] and not moves
-            given = row[1] or row[6]
+            moves, given = has_travel(row), has_feed(row)
+            needed = moves or row[6] if row[0] == "1" else row[6] and not moves
             if needed and not given:
                 self.refuse(missing_feed(line, column))
             if needed or given:

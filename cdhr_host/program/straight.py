@@ -1,12 +1,12 @@
 """Rows of straight moves (G0, G1) -> commands, a whole batch at once.
 
-A row is the numbers of one line as written, ``(g, F, X, Y, Z, E, F)``: ``g`` is ``"0"`` or
-``"1"``, a word that is not there is ``""``, and F stands before or after the others. The fast
-reader and the general parser both make such rows, so both mean the same.
+A row is the numbers of one line as written, ``(g, F, Z, X, Y, Z, E, F, "")``: ``g`` is ``"0"``
+or ``"1"``, a word that is not there is ``""``, and F and Z stand in one of their two places.
+The fast reader and the general parser both make such rows, so both mean the same.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -23,14 +23,30 @@ BATCH: Final = 1024
 Row = tuple[str, ...]
 
 
+def row_of(code: str, digits: Mapping[str, str]) -> Row:
+    """The row of a line's command and the numbers after its letters."""
+    f, x, y, z, e = (digits.get(letter, "") for letter in "FXYZE")
+    return (code[1], f, z, x, y, "", e, "", "")
+
+
+def has_feed(row: Row) -> bool:
+    """Whether F is in the line."""
+    return bool(row[1] or row[7])
+
+
+def has_travel(row: Row) -> bool:
+    """Whether X, Y or Z is in the line."""
+    return any(row[2:6])
+
+
 @dataclass(frozen=True, slots=True)
 class Steps:
     """N rows resolved against the modal state before them."""
 
     modal: Modal
     """after the last row; ``top`` and ``near`` are still those from before"""
-    ends: Array
-    """(N, 3) m"""
+    points: Array
+    """(N + 1, 3) m, from the start of the first row through the end of each"""
     feed: Array
     """(N,) m/s as programmed, NaN before the first F"""
     clay: Array
@@ -39,23 +55,27 @@ class Steps:
 
 def resolve(modal: Modal, rows: Sequence[Row]) -> Steps:
     """Absolute positions, feeds and clay of rows. Pure: same modal and rows, same result."""
-    columns = list(zip(*rows, strict=True))
-    feeds = _numbers([early or late for early, late in zip(columns[1], columns[6], strict=True)])
-    feed_before = math.nan if modal.feed is None else modal.feed
+    _, early_f, early_z, x, y, z, e, f, _ = zip(*rows, strict=True)
     count = len(rows)
-    feed = np.full(count, feed_before) if feeds is None else _held(feeds * modal.unit / MINUTE, feed_before)
-    ends = np.stack([_axis(modal, axis, _numbers(columns[2 + axis]), count) for axis in range(3)], axis=1)
-    push, e = _pushed(modal, _numbers(columns[5]), count)
+    feeds = _numbers([early or late for early, late in zip(early_f, f, strict=True)])
+    heights = _numbers([early or late for early, late in zip(early_z, z, strict=True)])
+    before = math.nan if modal.feed is None else modal.feed
+    feed = np.full(count, before) if feeds is None else _held(feeds * modal.unit / MINUTE, before)
+    points = np.empty((count + 1, 3))
+    points[0] = modal.position
+    for axis, values in enumerate((_numbers(x), _numbers(y), heights)):
+        points[1:, axis] = _axis(modal, axis, values)
+    push, e_after = _pushed(modal, _numbers(e), count)
     clay, debt = _excess(push, modal.debt)
     last = float(feed[-1])
     after = replace(
         modal,
-        position=tuple(ends[-1].tolist()),
+        position=tuple(points[-1].tolist()),
         feed=None if math.isnan(last) else last,
-        e=e,
+        e=e_after,
         debt=debt,
     )
-    return Steps(after, ends, feed, clay * modal.flow_factor)
+    return Steps(after, points, feed, clay * modal.flow_factor)
 
 
 def interpret(
@@ -68,22 +88,21 @@ def interpret(
     """
     steps = resolve(modal, rows)
     speed = np.where(np.isnan(steps.feed), speed_max, steps.feed * modal.speed_factor)
-    before = np.array(modal.position)
-    moved = (np.diff(steps.ends, axis=0, prepend=before[None]) != 0.0).any(axis=1)
+    moved = (steps.points[1:] != steps.points[:-1]).any(axis=1)
     still = np.flatnonzero(~moved & (steps.clay > 0.0))
     line = np.array(lines, dtype=np.int64)
     commands: list[Command] = []
-    start, first = before, 0
+    start, first = steps.points[0], 0
     for at in [*still.tolist(), len(rows)]:
         keep = first + np.flatnonzero(moved[first:at])
         if keep.size:
             commands.append(_moves(keep, line, steps, speed, start=start, air=modal.air))
-            start = steps.ends[keep[-1]]
+            start = steps.points[keep[-1] + 1]
         if at < len(rows):
             flow = modal.flow(float(steps.feed[at]))
             commands.append(Prime(int(line[at]), float(steps.clay[at]), flow))
         first = at + 1
-    return _printed(steps, before, modal.air), commands
+    return _printed(steps, modal.air), commands
 
 
 def _moves(
@@ -92,7 +111,7 @@ def _moves(
     return Moves(
         line[keep],
         np.array(start),
-        steps.ends[keep],
+        steps.points[keep + 1],
         speed[keep],
         steps.clay[keep],
         np.full(keep.size, air),
@@ -115,11 +134,11 @@ def _held(values: Array, before: float) -> Array:
     return np.concatenate(([before], values))[source]
 
 
-def _axis(modal: Modal, axis: int, values: Array | None, count: int) -> Array:
-    """(N,) m, where each row ends on one axis."""
+def _axis(modal: Modal, axis: int, values: Array | None) -> Array | float:
+    """(N,) m, where each row ends on one axis; one number when it does not move."""
     before = modal.position[axis]
     if values is None:
-        return np.full(count, before)
+        return before
     if modal.absolute:
         return _held(np.round(values * modal.unit + modal.offset[axis], GRID_DIGITS), before)
     return np.round(before + np.cumsum(np.nan_to_num(values * modal.unit)), GRID_DIGITS)
@@ -130,8 +149,10 @@ def _pushed(modal: Modal, values: Array | None, count: int) -> tuple[Array, floa
     if values is None:
         return np.zeros(count), modal.e
     if modal.absolute_e:
-        programmed = _held(values * modal.e_unit, modal.e)
-        return np.diff(programmed, prepend=modal.e) * modal.clay_per_e, float(programmed[-1])
+        programmed = np.empty(count + 1)
+        programmed[0] = modal.e
+        programmed[1:] = _held(values * modal.e_unit, modal.e)
+        return (programmed[1:] - programmed[:-1]) * modal.clay_per_e, float(programmed[-1])
     steps = np.nan_to_num(values * modal.e_unit)
     return steps * modal.clay_per_e, modal.e + float(steps.sum())
 
@@ -148,13 +169,12 @@ def _excess(push: Array, debt: float) -> tuple[Array, float]:
     return np.array(clay), debt
 
 
-def _printed(steps: Steps, before: Array, air: float) -> Modal:
+def _printed(steps: Steps, air: float) -> Modal:
     """The modal state with the height and the nearness of what these rows lay."""
     laid = np.ones(len(steps.clay), dtype=np.bool_) if air > 0.0 else steps.clay > 0.0
     if not laid.any():
         return steps.modal
-    starts = np.concatenate((before[None], steps.ends[:-1]))[laid]
-    ends = steps.ends[laid]
+    starts, ends = steps.points[:-1][laid], steps.points[1:][laid]
     top = max(starts[:, 2].max(), ends[:, 2].max())
     near = axis_distance(starts[:, :2], ends[:, :2]).min()
     return replace(steps.modal, top=max(steps.modal.top, float(top)), near=min(steps.modal.near, float(near)))

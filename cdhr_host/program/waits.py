@@ -68,12 +68,6 @@ def display(run: Run, block: Block) -> None:
     run.emit(Notice(block.line, "display", block.text[skip.end() if skip else 0 :]))
 
 
-def progress(run: Run, block: Block) -> None:
-    """M73: the slicer's own percentage."""
-    if "P" in block:
-        run.emit(Notice(block.line, "progress", f"{block.get('P'):g}"))
-
-
 def heater(run: Run, block: Block) -> None:
     """M104, M109, M140, M190: there is nothing to heat and nothing to wait for."""
     if block.get("S") > 0 or block.get("R") > 0:

@@ -11,6 +11,7 @@ from cdhr_host.program.arc import arc
 from cdhr_host.program.block import Block
 from cdhr_host.program.reference import reference
 from cdhr_host.program.run import Run
+from cdhr_host.program.straight import row_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +34,7 @@ class KnownWord:
 def straight(run: Run, block: Block) -> None:
     """G0, G1: the row of the line, beside those of the fast reader."""
     digits = {word.letter: word.digits for word in block.words}
-    row = (block.code[1], *(digits.get(letter, "") for letter in "FXYZE"), "")
-    run.straight([row], [block.line], block.column)
+    run.straight([row_of(block.code, digits)], [block.line], block.column)
 
 
 _TABLE: Final = (
@@ -63,7 +63,7 @@ _TABLE: Final = (
     KnownWord("M18", "SXYZE", "like M84", waits.hold, bare=True),
     KnownWord("M30", "", "end of the program; with a file name refused", waits.end, text=True),
     KnownWord("M42", "PS", "air as [air] pin_words says: P pin, S0-255", air.output, needs="PS"),
-    KnownWord("M73", "PRQSCD", "the slicer's own progress", waits.progress),
+    KnownWord("M73", "PRQSCD", "the slicer's own progress: accepted", waits.nothing),
     KnownWord("M82", "", "E is absolute (default)", settings.e_distances),
     KnownWord("M83", "", "E is relative", settings.e_distances),
     KnownWord("M84", "SXYZE", "exact stop; motors stay on and hold the cables", waits.hold, bare=True),
