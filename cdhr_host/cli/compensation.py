@@ -1,0 +1,70 @@
+"""``cdhr compensation``: what the pulleys would cost."""
+
+import json
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cdhr_host.cli.options import Json, ProfileName, examples
+from cdhr_host.cli.proving import open_machine
+from cdhr_host.cli.refusals import about, emit
+from cdhr_host.units import MM
+
+if TYPE_CHECKING:
+    from cdhr_host.values import Array
+
+EXAMPLES = examples(
+    "cdhr compensation",
+    "cdhr compensation --trajectory 36 --profile paper",
+    "cdhr compensation --json",
+)
+
+
+class Equation(StrEnum):
+    """The paper's trajectories."""
+
+    E15 = "15"
+    E35 = "35"
+    E36 = "36"
+
+
+def compensation(
+    trajectory: Annotated[
+        Equation,
+        typer.Option("--trajectory", "-t", metavar="EQ", help="Equation of the paper: 15, 35 or 36."),
+    ] = Equation.E15,
+    step: Annotated[
+        float, typer.Option(metavar="S", help="Time between two samples.", min=1e-4, max=10)
+    ] = 0.01,
+    profile: ProfileName = "paper-simulation",
+    json_: Json = False,
+) -> None:
+    """The nozzle's greatest error along a trajectory of the paper, with and without compensated pulleys."""
+    from cdhr_host.report.compensation import compensation as compare
+    from cdhr_host.samples import LAWS
+
+    law = LAWS[trajectory.value]
+    with about(profile):
+        found = compare(open_machine(profile), law.position(law.times(step)[:-1]))
+    if json_:
+        record = {
+            "profile": profile,
+            "trajectory": trajectory.value,
+            "duration_s": law.duration,
+            "step_s": step,
+            "uncompensated_mm": (found.uncompensated / MM).tolist(),
+            "compensated_mm": (found.compensated / MM).tolist(),
+        }
+        emit(json.dumps(record))
+        return
+    emit(
+        f"Eq. ({trajectory.value}) on {profile}: {law.drawing}, 0 <= t < {law.duration:g} s by {step:g} s\n"
+        f"greatest nozzle error, mm          x            y            z\n"
+        f"setpoints |BA| (straight cable)    {_row(found.uncompensated, '.5f')}\n"
+        f"setpoints round the pulleys        {_row(found.compensated, '.2e')}"
+    )
+
+
+def _row(error: "Array", form: str) -> str:
+    return "  ".join(f"{value / MM:<11{form}}" for value in error).rstrip()

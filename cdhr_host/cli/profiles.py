@@ -1,0 +1,89 @@
+"""``cdhr profile``: which machines are known, what they are, whether a file is one."""
+
+import json
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cdhr_host.cli.options import Json, examples
+from cdhr_host.cli.refusals import Refusal, about, emit
+
+if TYPE_CHECKING:
+    from cdhr_host.profile import Profile
+
+app = typer.Typer(
+    help="List, show and check machine profiles.",
+    epilog=examples(
+        "cdhr profile list",
+        "cdhr profile show paper > mine.toml",
+        "cdhr profile check mine.toml",
+    ),
+    no_args_is_help=True,
+)
+Name = Annotated[str, typer.Argument(metavar="P", help="Name of an installed profile, or a path.")]
+
+
+@app.command("list", epilog=examples("cdhr profile list", "cdhr profile list --json"))
+def list_(json_: Json = False) -> None:
+    """The installed profiles."""
+    from cdhr_host.pipeline import open_profile, profile_names
+
+    rows = [(name, open_profile(name).machine, path) for name, path in profile_names().items()]
+    if json_:
+        found = [{"name": n, "machine": m.name, "source": m.source, "path": str(p)} for n, m, p in rows]
+        emit(json.dumps({"profiles": found}))
+        return
+    width = max(len(name) for name, _, _ in rows)
+    for name, machine, path in rows:
+        emit(f"{name:<{width}}  {machine.name}\n{'':<{width}}  {path}")
+
+
+@app.command(epilog=examples("cdhr profile show paper", "cdhr profile show paper > mine.toml"))
+def show(name: Name = "paper", json_: Json = False) -> None:
+    """Every value of a profile with its unit: a valid profile in itself."""
+    from cdhr_host.pipeline import open_profile
+
+    with about(name):
+        sections = _sections(open_profile(name))
+    if json_:
+        emit(json.dumps({part: {key: value for key, value, _ in rows} for part, rows in sections.items()}))
+        return
+    for part, rows in sections.items():
+        emit(f"[{part}]")
+        for key, value, text in rows:
+            assignment = f"{key} = {json.dumps(value, ensure_ascii=False)}"
+            emit(f"{assignment:<42} # {text}" if text else assignment)
+        emit("")
+
+
+@app.command(epilog=examples("cdhr profile check mine.toml", "cdhr profile check"))
+def check(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[P]...", help="Names or paths; without any, the installed ones."),
+    ] = None,
+) -> None:
+    """Read profiles and list everything wrong with them; exit code 3 when there is anything."""
+    from cdhr_host.errors import ProfileError
+    from cdhr_host.pipeline import open_profile, profile_names
+
+    refusals = []
+    for name in names or profile_names():
+        try:
+            with about(name):
+                profile = open_profile(name)
+            emit(f"{name}: ok: {profile.machine.name}")
+        except Refusal as refusal:
+            refusals.append(str(refusal))
+    if refusals:
+        raise Refusal("\n".join(refusals), ProfileError.exit_code)
+
+
+def _sections(profile: "Profile") -> dict[str, list[tuple[str, Any, str]]]:
+    """Section -> (key with unit, value in that unit, description)."""
+    from cdhr_host.profile import described
+
+    found: dict[str, list[tuple[str, Any, str]]] = {}
+    for section, key, value, text in described(profile):
+        found.setdefault(section, []).append((key, value, text))
+    return found

@@ -1,0 +1,91 @@
+"""What ends a command early: one place turns every refusal into words and an exit code."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from typer import Context, Exit
+from typer.core import TyperGroup
+
+from cdhr_host.errors import CdhrError, Problem
+
+USAGE = 2
+INTERRUPTED = 130
+
+
+class Refusal(Exception):  # noqa: N818 - not an error of the program
+    """Words for standard error, and the exit code."""
+
+    def __init__(self, text: str, exit_code: int = USAGE) -> None:
+        super().__init__(text)
+        self.exit_code = exit_code
+
+
+def place(problem: Problem, source: str) -> str:
+    """``file``, ``file:line`` or ``file:line:column``."""
+    parts = [source, *(str(number) for number in (problem.line, problem.column) if number is not None)]
+    return ":".join(parts)
+
+
+def problem_lines(
+    problems: tuple[Problem, ...] | list[Problem], total: int, source: str, kind: str = "error"
+) -> Iterator[str]:
+    """One line a problem; a hint shared by neighbours stands once, after the last of them."""
+    for problem, following in zip(problems, [*problems[1:], None], strict=True):
+        yield f"{place(problem, source)}: {kind}: {problem.message}"
+        if problem.hint and (following is None or following.hint != problem.hint):
+            yield f"hint: {problem.hint}"
+    if total > len(problems):
+        yield f"{source}: {total - len(problems)} more like these, not listed"
+
+
+@contextmanager
+def about(source: str) -> Iterator[None]:
+    """Refusals raised inside are about this file."""
+    try:
+        yield
+    except CdhrError as error:
+        raise Refusal(
+            "\n".join(problem_lines(error.problems, error.total, source)), error.exit_code
+        ) from error
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """A disk that refuses while this file is written is the user's to mend, not a bug."""
+    try:
+        yield
+    except OSError as error:
+        raise Refusal(f"cdhr: error: cannot write {path}: {error.strerror}") from error
+
+
+def say(text: str) -> None:
+    """A line for the person at the terminal: standard error."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def emit(text: str) -> None:
+    """A result: standard output; raises Refusal when nobody takes it."""
+    try:
+        print(text, flush=True)
+    except OSError as error:
+        sys.stdout = open("/dev/null", "w")  # noqa: SIM115 - what is still in the buffer has nowhere to go
+        raise Refusal(f"cdhr: error: cannot write to standard output: {error.strerror}") from error
+
+
+class RefusingGroup(TyperGroup):
+    """A group of commands whose refusals end in words and an exit code; a bug keeps its traceback."""
+
+    def invoke(self, ctx: Context) -> Any:
+        """Run the command; raises Exit with the code of the contract."""
+        try:
+            with about("cdhr"):
+                return super().invoke(ctx)
+        except Refusal as refusal:
+            say(str(refusal))
+            raise Exit(refusal.exit_code) from None
+        except KeyboardInterrupt:
+            say("cdhr: interrupted; nothing moves")
+            raise Exit(INTERRUPTED) from None

@@ -1,0 +1,27 @@
+"""What the pulleys would cost: the nozzle's error with setpoints that take cables for straight lines."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdhr_host.mechanism import Cables, forward, lengths, uncompensated_error
+from cdhr_host.profile import Profile
+from cdhr_host.values import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Compensation:
+    """Greatest |error| of the nozzle along a trajectory, m, for x, y and z."""
+
+    uncompensated: Array
+    """(3,) with setpoints ‖BA‖"""
+    compensated: Array
+    """(3,) with setpoints that follow the cable round its pulley"""
+
+
+def compensation(profile: Profile, position: Array) -> Compensation:
+    """(N, 3) m of displacement of both platforms -> greatest errors. Raises MotionError out of reach."""
+    cables = Cables.from_profile(profile)
+    nozzle, _ = uncompensated_error(cables, position, position)
+    reached, _ = forward(cables, lengths(cables, position, position))
+    return Compensation(np.abs(nozzle).max(axis=0), np.abs(reached - position).max(axis=0))

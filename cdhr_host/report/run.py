@@ -1,0 +1,47 @@
+"""A run in words and as a record for machines."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from cdhr_host import __version__
+from cdhr_host.job import RunSummary
+from cdhr_host.pipeline import Proof
+from cdhr_host.report.summary import CM3, duration_text
+from cdhr_host.units import KPA, MM, MM3
+
+
+def run_record(run: RunSummary, proof: Proof, file: str, profile: str) -> dict[str, Any]:
+    """The JSON object of ``cdhr stream --json``."""
+    return {
+        "file": file,
+        "profile": profile,
+        "version": __version__,
+        "ok": not run.interrupted,
+        "interrupted": run.interrupted,
+        "lines": proof.lines,
+        "moves": proof.moves,
+        "path_mm": proof.path / MM,
+        "extruded_mm3": proof.extruded / MM3,
+        "duration_s": run.duration,
+        "planned_s": proof.duration,
+        "ticks": run.ticks,
+        "last_line": run.last_line,
+        "following_max_mm": (run.following_max / MM).tolist(),
+        "following_rms_mm": (run.following_rms / MM).tolist(),
+        "torque_max_nm": run.torque_max.tolist(),
+        "pressure_deviation_max_kpa": run.pressure_deviation_max / KPA,
+    }
+
+
+def run_lines(run: RunSummary, proof: Proof, file: str) -> Iterator[str]:
+    """What a person wants to know when a run is over: one line each."""
+    if run.interrupted:
+        yield f"{file}: stopped on request at line {run.last_line}, at rest, air off"
+    else:
+        yield f"{file}: printed, at rest, air off"
+    clay = f"{proof.extruded / CM3:.1f} cm³"
+    yield f"  program    {proof.lines} lines, {proof.moves} moves, {proof.path:.3f} m, {clay}"
+    yield f"  time       {duration_text(run.duration)}, {run.ticks} ticks"
+    away, torque = run.following_max / MM, run.torque_max
+    yield f"  following  {away.max():.3f} mm at most (slider {away.argmax() + 1})"
+    yield f"  torque     {torque.max():.3f} N m at most (motor {torque.argmax() + 1})"
