@@ -37,7 +37,9 @@ def bed_findings(profile: Profile, cables: Cables) -> Iterator[Finding]:
     if bed.origin_z > shape.lower_pulley_height and room > 0.0:
         within = min(bed.height, NEARLY * room)
         slack = [*_slack(profile, cables, within)]
-        yield from slack or _travel(profile, cables, within)
+        yield from slack
+        if not slack and profile.sliders.travel_min < profile.sliders.travel_max:
+            yield from _travel(profile, cables, within)
 
 
 def _planes(profile: Profile, room: float) -> Iterator[Finding]:
@@ -47,7 +49,8 @@ def _planes(profile: Profile, room: float) -> Iterator[Finding]:
         yield finding(
             {"bed.origin_z_mm", "geometry.lower_pulley_height_mm"},
             "bed.origin_z_mm",
-            f"puts the lower platform at or below the plane of the lower pulleys, {floor / MM:.6g} mm",
+            f"= {bed.origin_z / MM:.6g} puts the lower platform "
+            f"at or below the plane of the lower pulleys, {floor / MM:.6g} mm",
             value=bed.origin_z / MM,
             limit=floor / MM,
             hint="raise it above that plane",
@@ -96,12 +99,12 @@ def _travel(profile: Profile, cables: Cables, height: float) -> Iterator[Finding
         return bool(travel.min() >= sliders.travel_min and travel.max() <= sliders.travel_max)
 
     travel = _sliders(cables, bed.radius, height)
-    for key, limit, extreme, beyond in (
-        ("travel_min", sliders.travel_min, travel.min(axis=0), travel.min() < sliders.travel_min),
-        ("travel_max", sliders.travel_max, travel.max(axis=0), travel.max() > sliders.travel_max),
+    for key, limit, extreme, sign in (
+        ("travel_min", sliders.travel_min, travel.min(axis=0), -1.0),
+        ("travel_max", sliders.travel_max, travel.max(axis=0), 1.0),
     ):
-        if beyond:
-            cable = int(np.abs(extreme).argmax())
+        cable = int((sign * extreme).argmax())
+        if sign * extreme[cable] > sign * limit:
             radius = _largest(bed.radius, lambda size: fits(size, height))
             rise = _largest(height, lambda size: fits(bed.radius, size))
             yield finding(

@@ -36,10 +36,10 @@ def inconsistencies(profile: Profile) -> list[Finding]:
     Preload and bed are looked at when geometry, spring and windows are in order.
     """
     found = [*_out_of_order(profile), *_out_of_room(profile)]
-    keys = {key for _, problem in found for key in [str(problem.key).split(".")[0]]}
-    if not keys & {"geometry", "spring", "forces"}:
+    sections = {str(problem.key).split(".")[0] for _, problem in found}
+    if not sections & {"geometry", "spring", "forces"}:
         found += _preload(profile)
-    if "geometry" not in keys:
+    if "geometry" not in sections:
         found += bed_findings(profile, Cables.from_profile(profile))
     return found
 
@@ -51,7 +51,7 @@ def _out_of_order(profile: Profile) -> Iterator[Finding]:
             yield finding(
                 {low, high},
                 low,
-                f"must be below {high} = {limit:.6g}: {wrong}",
+                f"= {value:.6g} must be below {high} = {limit:.6g}: {wrong}",
                 value=value,
                 limit=limit,
                 hint=f"lower {low} or raise {high}",
@@ -71,7 +71,7 @@ def _out_of_room(profile: Profile) -> Iterator[Finding]:
         yield finding(
             tops,
             "geometry.upper_pulley_height_mm",
-            f"must be above the upper platform at the reference pose, {top / MM:.6g} mm",
+            f"= {ceiling / MM:.6g} must be above the upper platform at the reference pose, {top / MM:.6g} mm",
             value=ceiling / MM,
             limit=top / MM,
             hint="raise it, or lower geometry.reference_height_mm or geometry.reference_separation_mm",
@@ -83,7 +83,8 @@ def _out_of_room(profile: Profile) -> Iterator[Finding]:
             yield finding(
                 {key, "geometry.pulley_radius_mm", "geometry.pulley_circle_radius_mm"},
                 "geometry.pulley_radius_mm",
-                f"must be below the {room:.6g} mm from the attachments ({key}) to the pulley centres",
+                f"= {radius:.6g} must be below the {room:.6g} mm "
+                f"from the attachments ({key}) to the pulley centres",
                 value=radius,
                 limit=room,
                 hint=f"lower it, or {key}, or raise geometry.pulley_circle_radius_mm",
@@ -107,8 +108,9 @@ def _preload(profile: Profile) -> Iterator[Finding]:
                 yield finding(
                     GEOMETRY | SPRING | {key, f"platforms.{group}_mass_kg"},
                     key,
-                    f"leaves the reference pose out of the window: cables {names} carry {value:.4g} N each, "
-                    f"{'below' if key == low else 'above'} {limit:.6g} N",
+                    f"= {limit:.6g} leaves the reference pose out of the window: "
+                    f"cables {names} carry {value:.5g} N each, "
+                    f"{'below' if key == low else 'above'} it",
                     value=value,
                     limit=limit,
                     hint=_feasible_rest(profile, cables, loads),
@@ -131,6 +133,6 @@ def _feasible_rest(profile: Profile, cables: Cables, loads: Loads) -> str:
         return "no spring.rest_length_mm brings all six cables inside: widen the windows in [forces]"
     shortest, longest = ((loads.separation - force / loads.stiffness) / MM for force in (most, least))
     return (
-        f"a spring.rest_length_mm from {shortest:.4g} to {longest:.4g} "
+        f"a spring.rest_length_mm from {shortest:.6g} to {longest:.6g} "
         f"(spring force {least:.4g} to {most:.4g} N) brings all six cables inside; or change the window"
     )
