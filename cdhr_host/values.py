@@ -141,6 +141,9 @@ class ToolTrack(_Frozen):
     air: Array
     """(N,) Pa held by air words; 0 where flow rules"""
 
+    def __getitem__(self, rows: slice | Flags) -> "ToolTrack":
+        return ToolTrack(*(getattr(self, field.name)[rows] for field in fields(self)))
+
 
 @dataclass(frozen=True, slots=True)
 class CableState(_Frozen):
@@ -182,7 +185,7 @@ class Setpoints(_Frozen):
     def __len__(self) -> int:
         return len(self.tick)
 
-    def __getitem__(self, rows: slice) -> "Setpoints":
+    def __getitem__(self, rows: slice | Flags) -> "Setpoints":
         return Setpoints(*(getattr(self, field.name)[rows] for field in fields(self)))
 
 

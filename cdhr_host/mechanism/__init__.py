@@ -5,6 +5,7 @@ q = position_G - cables.reference_G.
 """
 
 from cdhr_host.mechanism import trajectories
+from cdhr_host.mechanism.bounds import direction_change_bound
 from cdhr_host.mechanism.cables import Cables, Loads
 from cdhr_host.mechanism.consistency import inconsistencies
 from cdhr_host.mechanism.forward import forward, uncompensated_error
@@ -16,6 +17,7 @@ __all__ = [
     "Cables",
     "Loads",
     "cable_state",
+    "direction_change_bound",
     "forward",
     "inconsistencies",
     "jacobian",

@@ -1,23 +1,12 @@
-"""The columns of the logs: what each is called, its unit, and where its numbers come from."""
+"""The columns of a run's log: the setpoint log's, then what came back from the drives."""
 
 import numpy as np
 
-from cdhr_host.units import KPA, MM, MM3
-from cdhr_host.values import Array, Feedback, Ints, Setpoints
+from cdhr_host.pipeline.columns import AXES, SETPOINT_COLUMNS, Column, setpoint_columns, spread
+from cdhr_host.units import KPA, MM
+from cdhr_host.values import Feedback, Setpoints
 
-Column = Array | Ints
-AXES = range(1, 7)
-
-SETPOINT_COLUMNS: tuple[str, ...] = (
-    "t_s",
-    "line",
-    *(f"{axis}_mm" for axis in "xyzuvw"),
-    *(f"slider{i}_mm" for i in AXES),
-    *(f"tension{i}_n" for i in AXES),
-    "flow_mm3_s",
-    "pressure_kpa",
-)
-"""Every log begins with these, in this order."""
+__all__ = ["FEEDBACK_COLUMNS", "SETPOINT_COLUMNS", "Column", "run_columns", "setpoint_columns"]
 
 FEEDBACK_COLUMNS: tuple[str, ...] = (
     *(f"slider{i}_actual_mm" for i in AXES),
@@ -29,36 +18,15 @@ FEEDBACK_COLUMNS: tuple[str, ...] = (
 """A run's log goes on with these: what came back, and setpoint minus measured slider."""
 
 
-def _spread(names: str, rows: Column, unit: float = 1.0) -> dict[str, Column]:
-    """(N, k) -> k columns; ``{}`` in ``names`` counts from 1."""
-    values = rows / unit if unit != 1.0 else rows
-    return {names.format(i + 1): values[:, i] for i in range(rows.shape[1])}
-
-
-def setpoint_columns(setpoints: Setpoints) -> dict[str, Column]:
-    """Setpoints -> {column: (N,)} in the log's units and order."""
-    nozzle, upper = setpoints.nozzle_G / MM, setpoints.upper / MM
-    return {
-        "t_s": setpoints.t,
-        "line": setpoints.line,
-        **{f"{axis}_mm": nozzle[:, k] for k, axis in enumerate("xyz")},
-        **{f"{axis}_mm": upper[:, k] for k, axis in enumerate("uvw")},
-        **_spread("slider{}_mm", setpoints.slider, MM),
-        **_spread("tension{}_n", setpoints.tension),
-        "flow_mm3_s": setpoints.flow / MM3,
-        "pressure_kpa": setpoints.pressure / KPA,
-    }
-
-
 def run_columns(setpoints: Setpoints, feedback: Feedback) -> dict[str, Column]:
     """Setpoints and the feedback of the same ticks -> {column: (N,)}."""
     if not np.array_equal(setpoints.tick, feedback.tick):
         raise ValueError("setpoints and feedback are of different ticks")
     return {
         **setpoint_columns(setpoints),
-        **_spread("slider{}_actual_mm", feedback.slider, MM),
-        **_spread("slider{}_error_mm", setpoints.slider - feedback.slider, MM),
-        **_spread("slider{}_counts", feedback.counts),
-        **_spread("torque{}_nm", feedback.torque),
+        **spread("slider{}_actual_mm", feedback.slider, MM),
+        **spread("slider{}_error_mm", setpoints.slider - feedback.slider, MM),
+        **spread("slider{}_counts", feedback.counts),
+        **spread("torque{}_nm", feedback.torque),
         "pressure_actual_kpa": feedback.pressure / KPA,
     }

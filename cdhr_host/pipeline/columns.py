@@ -1,0 +1,39 @@
+"""The columns of the setpoint log: what each is called, its unit, and where its numbers come from."""
+
+from cdhr_host.units import KPA, MM, MM3
+from cdhr_host.values import Array, Ints, Setpoints
+
+Column = Array | Ints
+AXES = range(1, 7)
+
+SETPOINT_COLUMNS: tuple[str, ...] = (
+    "t_s",
+    "line",
+    *(f"{axis}_mm" for axis in "xyzuvw"),
+    *(f"slider{i}_mm" for i in AXES),
+    *(f"tension{i}_n" for i in AXES),
+    "flow_mm3_s",
+    "pressure_kpa",
+)
+"""Every log begins with these, in this order."""
+
+
+def spread(names: str, rows: Column, unit: float = 1.0) -> dict[str, Column]:
+    """(N, k) -> k columns; ``{}`` in ``names`` counts from 1."""
+    values = rows / unit if unit != 1.0 else rows
+    return {names.format(i + 1): values[:, i] for i in range(rows.shape[1])}
+
+
+def setpoint_columns(setpoints: Setpoints) -> dict[str, Column]:
+    """Setpoints -> {column: (N,)} in the log's units and order."""
+    nozzle, upper = setpoints.nozzle_G / MM, setpoints.upper / MM
+    return {
+        "t_s": setpoints.t,
+        "line": setpoints.line,
+        **{f"{axis}_mm": nozzle[:, k] for k, axis in enumerate("xyz")},
+        **{f"{axis}_mm": upper[:, k] for k, axis in enumerate("uvw")},
+        **spread("slider{}_mm", setpoints.slider, MM),
+        **spread("tension{}_n", setpoints.tension),
+        "flow_mm3_s": setpoints.flow / MM3,
+        "pressure_kpa": setpoints.pressure / KPA,
+    }

@@ -1,0 +1,46 @@
+"""A profile ready for use: read, validated, and free of contradictions."""
+
+from collections.abc import Iterator
+
+from cdhr_host.errors import MotionError, Problem, ProfileError
+from cdhr_host.mechanism import direction_change_bound, inconsistencies
+from cdhr_host.motion.limits import MotionLimits
+from cdhr_host.profile import Profile, find, read_table, validate
+
+
+def open_profile(name_or_path: str) -> Profile:
+    """The profile of a name or path; raises ProfileError with every problem of it at once."""
+    profile, problems = check_profile(name_or_path)
+    if problems:
+        raise ProfileError(problems)
+    return profile
+
+
+def check_profile(name_or_path: str) -> tuple[Profile, list[Problem]]:
+    """A profile and all its problems; not to be used while it has any.
+
+    Contradictions are looked for even where some keys are bad, except those that rely on a
+    bad key. Raises ProfileError when there is no such profile or it is not TOML.
+    """
+    profile, problems = validate(read_table(find(name_or_path)))
+    bad = {problem.key for problem in problems}
+    sections = {key for key in bad if key and "." not in key}
+    for keys, problem in _contradictions(profile):
+        relies_on_bad = keys & bad or {key.split(".")[0] for key in keys} & sections
+        if not relies_on_bad:
+            problems.append(problem)
+    return profile, problems
+
+
+def _contradictions(profile: Profile) -> Iterator[tuple[frozenset[str], Problem]]:
+    found = inconsistencies(profile)
+    yield from found
+    if found:
+        return
+    try:
+        MotionLimits.from_profile(profile, direction_change_bound(profile))
+    except MotionError as error:
+        keys = frozenset(
+            {"limits.speed_max_mm_s", "sliders.acceleration_max_mm_s2", "sliders.jerk_max_mm_s3"}
+        )
+        yield keys, error.problems[0]

@@ -1,0 +1,161 @@
+"""The whole file walked once without drives: time, extremes, and everything it cannot do."""
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from functools import singledispatchmethod
+
+import numpy as np
+
+from cdhr_host.errors import MAX_LISTED, Problem
+from cdhr_host.pipeline.columns import setpoint_columns
+from cdhr_host.pipeline.staircase import Checked, Staircase
+from cdhr_host.profile import Profile
+from cdhr_host.values import Arc, Command, Dwell, Moves, Notice, Pause, Prime, Setpoints, Stop
+
+Extreme = tuple[float, int, float, int]
+"""least, its line, greatest, its line"""
+
+
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """What is known of a program once it was walked."""
+
+    lines: int
+    moves: int
+    duration: float
+    """s"""
+    path: float
+    """m, as drawn"""
+    extruded: float
+    """m³ of clay, as drawn"""
+    problems: tuple[Problem, ...]
+    """the first hundred"""
+    total_problems: int
+    extremes: dict[str, Extreme]
+    """of each log column, in the log's unit"""
+    layers: tuple[tuple[int, int], ...]
+    """(line, layer) where each layer begins"""
+    pauses: int
+    warnings: tuple[Problem, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether the machine can do all of it."""
+        return self.total_problems == 0
+
+
+def prove(
+    chunks: Iterable[bytes],
+    profile: Profile,
+    *,
+    rate_hz: float | None = None,
+    sink: Callable[[Setpoints], None] | None = None,
+) -> Proof:
+    """Walk a program's text once, in memory that does not grow with it.
+
+    ``sink`` gets every block of setpoints as long as there is no problem. Raises
+    ProgramError for text that is not understood; what the machine cannot do is listed in
+    the proof instead.
+    """
+    staircase = Staircase(profile, rate_hz=rate_hz)
+    tally = _Tally()
+    for step in staircase.walk(chunks):
+        if isinstance(step, Checked):
+            tally.block(step)
+            if sink is not None and not tally.total:
+                sink(step.setpoints)
+        else:
+            tally.command(step)
+    return tally.proof(staircase.lines)
+
+
+@dataclass(slots=True)
+class _Tally:
+    """Sums and extremes so far."""
+
+    moves: int = 0
+    path: float = 0.0
+    extruded: float = 0.0
+    duration: float = 0.0
+    pauses: int = 0
+    total: int = 0
+    problems: list[Problem] = field(default_factory=list)
+    layers: list[tuple[int, int]] = field(default_factory=list)
+    warnings: list[Problem] = field(default_factory=list)
+    extremes: dict[str, Extreme] = field(default_factory=dict)
+
+    def block(self, checked: Checked) -> None:
+        """Take in a block of setpoints."""
+        self.total += len(checked.problems)
+        self.problems.extend(checked.problems[: MAX_LISTED - len(self.problems)])
+        rows = checked.setpoints
+        if not len(rows):
+            return
+        self.duration = float(rows.t[-1])
+        for name, values in setpoint_columns(rows).items():
+            if name not in {"t_s", "line"}:
+                low, high = int(np.argmin(values)), int(np.argmax(values))
+                self._widen(
+                    name, (float(values[low]), int(rows.line[low]), float(values[high]), int(rows.line[high]))
+                )
+
+    def _widen(self, name: str, found: Extreme) -> None:
+        known = self.extremes.get(name, found)
+        low, high = min(known[:2], found[:2]), max(known[2:], found[2:], key=lambda pair: pair[0])
+        self.extremes[name] = (*low, *high)
+
+    @singledispatchmethod
+    def command(self, command: Command) -> None:
+        """Take in a command."""
+        raise TypeError(f"not a command: {command!r}")
+
+    @command.register
+    def _(self, command: Moves) -> None:
+        steps = np.diff(np.concatenate((command.start_G[None], command.end_G)), axis=0)
+        self.moves += len(command.line)
+        self.path += float(np.sqrt(np.einsum("nk,nk->n", steps, steps)).sum())
+        self.extruded += float(command.clay.sum())
+
+    @command.register
+    def _(self, command: Arc) -> None:
+        radius = math.dist(command.start_G[:2].tolist(), command.centre_G.tolist())
+        self.moves += 1
+        self.path += math.hypot(radius * command.sweep, float(command.end_G[2] - command.start_G[2]))
+        self.extruded += command.clay
+
+    @command.register
+    def _(self, command: Prime) -> None:
+        self.moves += 1
+        self.extruded += command.clay
+
+    @command.register
+    def _(self, command: Notice) -> None:
+        if command.kind == "layer":
+            self.layers.append((command.line, int(command.text)))
+        elif command.kind == "warning":
+            self.warnings.append(Problem("warning", command.text, line=command.line))
+
+    @command.register
+    def _(self, _: Pause) -> None:
+        self.pauses += 1
+
+    @command.register(Dwell | Stop)
+    def _(self, _: Dwell | Stop) -> None:
+        """Adds nothing of its own; its time is in the setpoints."""
+
+    def proof(self, lines: int) -> Proof:
+        """All of it."""
+        return Proof(
+            lines=lines,
+            moves=self.moves,
+            duration=self.duration,
+            path=self.path,
+            extruded=self.extruded,
+            problems=tuple(self.problems),
+            total_problems=self.total,
+            extremes=self.extremes,
+            layers=tuple(self.layers),
+            pauses=self.pauses,
+            warnings=tuple(self.warnings),
+        )

@@ -1,0 +1,105 @@
+"""Text -> Command -> Leg -> ToolTrack -> CableState -> Setpoints, a block at a time."""
+
+import copy
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdhr_host.errors import MotionError, Problem
+from cdhr_host.extrusion import air_command
+from cdhr_host.mechanism import Cables, Loads, cable_state, direction_change_bound, slider
+from cdhr_host.motion.limits import MotionLimits
+from cdhr_host.motion.planner import Planner
+from cdhr_host.pipeline.audit import Audit, on_bed
+from cdhr_host.profile import Profile
+from cdhr_host.program import Interpreter
+from cdhr_host.values import Command, Pause, Setpoints, ToolTrack
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """A block of setpoints, each checked; only those on the bed are there."""
+
+    setpoints: Setpoints
+    problems: tuple[Problem, ...]
+    """what the machine cannot do of it, one for each line, limit and cable"""
+
+
+class Staircase:
+    """One machine standing at rest, and the modal state of the programs it is given.
+
+    It starts at the reference pose. Each text ends at rest, so that the next can follow.
+    """
+
+    def __init__(self, profile: Profile, *, rate_hz: float | None = None) -> None:
+        self.profile = profile
+        self._cables = Cables.from_profile(profile)
+        self._loads = Loads.from_profile(profile)
+        self._period = profile.drives.period if rate_hz is None else 1.0 / rate_hz
+        limits = MotionLimits.from_profile(profile, direction_change_bound(profile))
+        self._audit = Audit(profile)
+        self._planner = Planner(limits, self._period, self._cables.reference_G)
+        self._interpreter = Interpreter(profile, at_G=self._cables.reference_G)
+
+    @property
+    def lines(self) -> int:
+        """Lines read so far."""
+        return self._interpreter.lines
+
+    def walk(self, chunks: Iterable[bytes]) -> Iterator[Command | Checked]:
+        """Each command of a text, followed by the setpoints it settles; ends at rest.
+
+        Before a Pause comes everything up to rest. Raises ProgramError, after the last line,
+        for text that is not understood.
+        """
+        for command in self._interpreter.commands(chunks):
+            for track in self._planner.tracks(command):
+                yield self._checked(track)
+            if isinstance(command, Pause):
+                yield from self._rest()
+            yield command
+        yield from self._rest()
+
+    def setpoints(self, chunks: Iterable[bytes]) -> Iterator[Setpoints]:
+        """Setpoints only; raises MotionError at the first the machine cannot do."""
+        for step in self.walk(chunks):
+            if isinstance(step, Checked):
+                if step.problems:
+                    raise MotionError(step.problems)
+                yield step.setpoints
+
+    def prepare(self, chunks: Iterable[bytes]) -> list[Setpoints]:
+        """All setpoints of a short text, or a refusal that leaves the machine as it was."""
+        planner, modal = copy.copy(self._planner), self._interpreter.modal
+        try:
+            return list(self.setpoints(chunks))
+        except BaseException:
+            self._planner, self._interpreter.modal = planner, modal
+            raise
+
+    def _rest(self) -> Iterator[Checked]:
+        for track in self._planner.finish():
+            yield self._checked(track)
+
+    def _checked(self, track: ToolTrack) -> Checked:
+        inside = on_bed(track.position_G, self.profile)
+        problems = self._audit.places(track)
+        if not inside.all():
+            track = track[inside]
+        q = track.position_G - self._cables.reference_G
+        state = cable_state(self._cables, self._loads, q, q, track.velocity, track.acceleration)
+        air = air_command(track.flow, track.air, self.profile.extruder)
+        setpoints = Setpoints(
+            tick=track.tick,
+            t=(track.tick * self._period).astype(np.float64),
+            line=track.line,
+            nozzle_G=track.position_G,
+            upper=q,
+            slider=slider(self._cables, state.length),
+            tension=state.tension,
+            flow=air.flow,
+            pressure=air.pressure,
+        )
+        problems += self._audit.motion(track, state, setpoints)
+        return Checked(setpoints, tuple(problems))
