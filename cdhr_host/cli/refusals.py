@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from typer import Context, Exit
+from typer import Exit
 from typer.core import TyperGroup
 
 from cdhr_host.errors import CdhrError, Problem
@@ -78,7 +78,7 @@ def emit(text: str) -> None:
 class RefusingGroup(TyperGroup):
     """A group of commands whose refusals end in words and an exit code; a bug keeps its traceback."""
 
-    def invoke(self, ctx: Context) -> Any:
+    def invoke(self, ctx: Any) -> Any:
         """Run the command; raises Exit with the code of the contract."""
         try:
             with about("cdhr"):

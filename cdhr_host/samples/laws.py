@@ -22,7 +22,7 @@ class Law:
 
     def times(self, step: float) -> Array:
         """s: 0 to the duration in steps, the end left out when it is no whole step."""
-        return np.arange(int(round(self.duration / step, 6)) + 1) * step
+        return np.arange(int(round(self.duration / step, 6)) + 1, dtype=np.float64) * step
 
 
 LAWS: Final = {

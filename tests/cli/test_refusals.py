@@ -36,13 +36,13 @@ def test_problems_beyond_those_listed_are_counted() -> None:
     ("error", "code"), [(ProfileError, 3), (ProgramError, 4), (MotionError, 5), (DriveError, 6)]
 )
 def test_refusals_keep_the_exit_code_of_the_contract(error: type[CdhrError], code: int) -> None:
-    with pytest.raises(Refusal, match="^file: error: no$") as refused, about("file"):
+    with pytest.raises(Refusal, match=r"^file: error: no$") as refused, about("file"):
         raise error("no")
     assert refused.value.exit_code == code
 
 
 def test_a_disk_that_refuses_is_not_a_bug() -> None:
-    with pytest.raises(Refusal, match="cannot write run.csv: No space left"), writing(Path("run.csv")):
+    with pytest.raises(Refusal, match=r"cannot write run\.csv: No space left"), writing(Path("run.csv")):
         raise OSError(28, "No space left on device")
 
 

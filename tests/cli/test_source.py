@@ -1,4 +1,4 @@
-"""Programs are read whole and in chunks, whatever they are packed in; what is no program is refused kindly."""
+"""Programs are read in chunks, whatever they are packed in; what is no program is refused kindly."""
 
 import gzip
 import io
@@ -45,7 +45,7 @@ def test_standard_input_has_no_size(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_missing_file_names_its_nearest_neighbour(program: Path) -> None:
-    with pytest.raises(Refusal, match="no such file\nhint: did you mean .*ring.gcode") as refused:
+    with pytest.raises(Refusal, match=r"no such file\nhint: did you mean .*ring\.gcode") as refused:
         Source(str(program.with_name("rign.gcode")))
     assert refused.value.exit_code == 2
 
