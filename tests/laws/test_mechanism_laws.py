@@ -1,8 +1,10 @@
 """What holds for every machine and every pose between the pulleys."""
 
+import math
+
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from cdhr_host.mechanism import Cables, Loads, cable_state, forward, jacobian, lengths, tensions
@@ -72,9 +74,8 @@ def test_work_of_the_cables_is_work_on_the_platforms(name: str, q: Array, v: Arr
     assert -float(state.tension[0] @ state.rate[0]) == pytest.approx(work, abs=1e-9)
 
 
-@settings(max_examples=50)
 @given(machines, poses(), moves)
-def test_the_nozzle_is_never_slower_than_a_cable(name: str, q: Array, v: Array) -> None:
+def test_no_cable_is_faster_than_the_nozzle(name: str, q: Array, v: Array) -> None:
     cables, loads = MACHINES[name]
     rate = cable_state(cables, loads, q, q, v, v).rate
-    assert np.abs(rate).max() <= np.linalg.norm(v) * (1 + 1e-12)
+    assert np.abs(rate).max() <= math.hypot(*v[0]) * (1 + 1e-12)
