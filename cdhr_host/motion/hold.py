@@ -17,7 +17,6 @@ jerk while it stops.
 """
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -141,16 +140,17 @@ def _demands(values: Array, period: float) -> Array:
     )
 
 
-def _candidates(plan: _Plan, profile: Profile) -> Iterator[tuple[int, int]]:
+def _candidates(plan: _Plan, profile: Profile) -> list[tuple[int, int]]:
     """(rows played before the ramp, rows of the ramp), soonest rest first, within the plan."""
     bound = _duration(profile, *plan.speeds) / plan.period
     waits = np.linspace(0.0, _longest_wait(profile) / plan.period, STARTS)
     starts = {int(wait) for wait in waits}
     ramps = {max(2, math.ceil(stretch * bound)) for stretch in STRETCHES}
     pairs = {(start, ramp) for start in starts for ramp in ramps}
-    last = plan.rows - 1
-    fitting = [pair for pair in pairs if plan.rests or pair[0] + pair[1] / 2.0 <= last]
-    return iter(sorted(fitting, key=lambda pair: (sum(pair), pair)) or [(0, 2 * last)])
+    if not plan.rests:
+        last = plan.rows - 1
+        pairs = {pair for pair in pairs if pair[0] + pair[1] / 2.0 <= last} | {(0, 2 * last)}
+    return sorted(pairs, key=lambda pair: (sum(pair), pair))
 
 
 def _playback(start: int, ramp: int) -> Array:

@@ -1,0 +1,40 @@
+import pytest
+from trajectories import PAPER
+
+from cdhr_host.drives import LinkState, PacedClock, open_link
+from cdhr_host.errors import DriveError
+
+
+def _open(url):
+    return open_link(url, PAPER, PacedClock(float("inf")))
+
+
+def test_loopback_is_opened():
+    assert _open("loopback:").state is LinkState.OPEN
+
+
+@pytest.mark.parametrize("url", ["slcan:/dev/ttyACM0@1000000", "socketcan:can0", "link:/dev/ttyACM0@921600"])
+def test_links_of_the_contract_are_not_available_yet(url):
+    with pytest.raises(DriveError, match="not available yet"):
+        _open(url)
+
+
+@pytest.mark.parametrize(
+    ("url", "hint"),
+    [
+        ("loopbak:", "did you mean loopback:?"),
+        ("loopback", "did you mean loopback:?"),
+        ("SLCAN:/dev/x", "did you mean slcan:PATH@BITRATE?"),
+        ("quux:1", "known are loopback:, slcan:PATH@BITRATE"),
+        ("", "known are loopback:"),
+    ],
+)
+def test_unknown_links_are_refused_with_the_nearest(url, hint):
+    with pytest.raises(DriveError, match="are not known") as caught:
+        _open(url)
+    assert caught.value.problems[0].hint.startswith(hint)
+
+
+def test_loopback_takes_nothing():
+    with pytest.raises(DriveError, match="takes nothing"):
+        _open("loopback:fast")
