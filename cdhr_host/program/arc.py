@@ -53,7 +53,7 @@ def arc(run: Run, block: Block) -> None:
     try:
         centre = _centre(block, run.modal, before, end)
     except _NoArcError as refused:
-        if not run.lost:
+        if refused.value is None or not run.lost:
             run.refuse(_problem(block, refused))
         run.modal = steps.modal
         return

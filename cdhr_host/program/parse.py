@@ -18,13 +18,14 @@ _CHECKSUM: Final = re.compile(r"\*[ \t]*([0-9]{1,3})[ \t]*\Z")
 _HEAD: Final = re.compile(
     r"[ \t]*(?:[Nn][ \t]*[0-9]++[ \t]*)?([A-Za-z])[ \t]*(" + NUMBER + r")(?=[ \t;*]|\Z)[ \t]*"
 )
-_COMMENT: Final = re.compile(r"[;()]")
+_COMMENT: Final = re.compile(r";.*|\([^()]*+\)")
 _BRACKET: Final = re.compile(r"[()]")
 _WORD: Final = re.compile(r"([A-Za-z])[ \t]*(" + NUMBER + r")?")
 _GAP: Final = re.compile(r"[ \t]*")
 _TOKEN: Final = re.compile(r"[^ \t]+")
 _REST: Final = re.compile(r"[^A-Za-z \t]+")
 _EXPONENT: Final = re.compile(r"[eE]([-+]?)([0-9]++)")
+_WORD_E: Final = re.compile(r"[eE]")
 _COMMA: Final = re.compile(r",[0-9]++")
 _NOT_FINITE: Final = re.compile(r"[ \t]*[-+]?(?:nan|inf(?:inity)?)(?![A-Za-z])", re.IGNORECASE)
 
@@ -36,7 +37,8 @@ def parse_line(text: str, line: int) -> tuple[Block | None, list[Problem]]:
     """
     parser = _Parser(line)
     block = parser.block(text)
-    return (None if parser.problems else block), parser.problems
+    problems = sorted(parser.problems, key=lambda problem: problem.column or 0)
+    return (None if problems else block), problems
 
 
 class _Parser:
@@ -56,7 +58,8 @@ class _Parser:
             row = WORDS.get(code)
             if row is not None and row.text:
                 return self._text_block(text, head, code)
-        words = self._words(self._without_checksum(self._without_comments(text), text))
+        bare = self._without_comments(text)
+        words = [] if self.problems else self._words(self._without_checksum(bare, text))
         if words and words[0].letter == "N" and words[0].value is not None:
             del words[0]
         return self._checked(words) if words else None
@@ -72,23 +75,17 @@ class _Parser:
 
     def _without_comments(self, text: str) -> str:
         """Comments blanked, so that columns stay."""
-        at = 0
-        while (found := _COMMENT.search(text, at)) is not None:
-            at = found.start()
-            if found.group() == ";":
-                return text[:at]
-            close = _BRACKET.search(text, at + 1)
-            if found.group() == ")" or close is None or close.group() == "(":
-                names = {")": "no '(' before", "(": "no ')' after"}
-                self.refuse(
-                    "comment",
-                    f"a comment with {names[found.group()]} it",
-                    at,
-                    "comments in parentheses end in the same line and hold no other; or use ';'",
-                )
-                return text[:at]
-            text = text[:at] + " " * (close.end() - at) + text[close.end() :]
-        return text
+        bare = _COMMENT.sub(lambda found: " " * len(found.group()) if found.group()[0] == "(" else "", text)
+        bracket = _BRACKET.search(bare)
+        if bracket is not None:
+            missing = "no ')' after it" if bracket.group() == "(" else "no '(' before it"
+            self.refuse(
+                "comment",
+                f"a '{bracket.group()}' with {missing}",
+                bracket.start(),
+                "comments in parentheses end in the same line and hold no other; or use ';'",
+            )
+        return bare
 
     def _without_checksum(self, text: str, written: str) -> str:
         """``N12 G1 X1*71``: the XOR of the bytes before ``*``, counted from N."""
@@ -111,24 +108,23 @@ class _Parser:
         at = _end(_GAP.match(text))
         while at < len(text):
             found = _WORD.match(text, at)
-            if found is None:
-                at = self._stray(text, at)
-                continue
-            end = self._malformed(text, found)
-            if end is None:
-                value = float(found[2]) if found[2] else None
-                words.append(Word(found[1].upper(), value, at + 1, found[2] or ""))
-                end = found.end()
-            at = _end(_GAP.match(text, end))
+            at = self._stray(text, at) if found is None else self._word(text, found, words)
+            at = _end(_GAP.match(text, at))
         return words
+
+    def _word(self, text: str, found: re.Match[str], words: list[Word]) -> int:
+        end = self._malformed(text, found)
+        if end is not None:
+            return end
+        value = float(found[2]) if found[2] else None
+        words.append(Word(found[1].upper(), value, found.start() + 1, found[2] or ""))
+        return found.end()
 
     def _stray(self, text: str, at: int) -> int:
         token = _TOKEN.match(text, at)
         assert token is not None
-        shown = readable(token.group())
-        self.refuse(
-            "word", f"'{shown[:40]}' is not a word", at, "a word is a letter and a number: X10.5", shown
-        )
+        shown = readable(token.group())[:40]
+        self.refuse("word", f"'{shown}' is not a word", at, "a word is a letter and a number: X10.5", shown)
         return token.end()
 
     def _malformed(self, text: str, found: re.Match[str]) -> int | None:
@@ -136,8 +132,9 @@ class _Parser:
         letter, digits, end = found[1], found[2], found.end()
         if not digits:
             bad = _NOT_FINITE.match(text, found.start() + 1)
+            rest = _REST.match(text, found.start() + 1)
             if bad is None:
-                return None
+                return None if rest is None else self._rest(found, rest)
             self.refuse(
                 "number", f"{letter}{bad.group().strip()} is not a number", found.start(), "give a number"
             )
@@ -253,7 +250,7 @@ def _is_exponent(text: str, found: re.Match[str], exponent: re.Match[str]) -> bo
     and where an E word follows.
     """
     e, sign, digits = exponent.group()[0], exponent[1], exponent[2]
-    apart = text[: found.start()].endswith((" ", "\t"))
+    apart = text[max(found.start() - 1, 0)] in " \t"
     printed = bool(sign) and len(digits) >= 2 and digits[0] == "0"
-    another = "E" in text[exponent.end() :].upper() or found[1].upper() == "E"
+    another = found[1] in "eE" or _WORD_E.search(text, exponent.end()) is not None
     return apart or e.isupper() != found[1].isupper() or printed or another

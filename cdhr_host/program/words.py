@@ -124,10 +124,10 @@ def unknown(code: str, line: int, column: int) -> Problem:
 
 def nearest(code: str) -> str:
     """The known word most like this one, by letter, then by spelling, then by number."""
+    number = float(code[1:] or 0)
 
     def unlike(known: str) -> tuple[bool, float, float]:
-        ratio = difflib.SequenceMatcher(None, known, code).ratio()
-        apart = abs(float(known[1:]) - float(code[1:] or 0))
-        return known[0] != code[0], -ratio, apart
+        alike = difflib.SequenceMatcher(None, known[1:].zfill(4), code[1:].zfill(4)).ratio()
+        return known[0] != code[0], -alike, abs(float(known[1:]) - number)
 
     return min(WORDS, key=unlike)
