@@ -24,7 +24,6 @@ _LINE: Final = re.compile(
 )
 """Every line is one match: the columns of a plain G0 or G1 as slicers write it, or the whole
 line as the last group, for the parser."""
-_MOTION: Final = re.compile(r"[ \t]*(?:[Nn][ \t]*[0-9]+[ \t]*)?[Gg][ \t]*0*[0-3](?![0-9])")
 
 
 class Interpreter:
@@ -138,9 +137,10 @@ def _line(run: Run, text: str, line: int) -> bool:
 
 def _refused(run: Run, text: str) -> None:
     """A refused line leaves unknown what it would have set: later lines are not blamed for it."""
-    if "F" in text.upper():
+    letters = set(text.upper())
+    if "F" in letters:
         run.unfed = False
-    if _MOTION.match(text):
+    if letters & {"X", "Y"}:
         run.flush()
         run.lost = True
 

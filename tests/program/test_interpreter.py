@@ -5,6 +5,7 @@ from program_reading import PAPER_WIDE, moves, shown, warnings
 
 from cdhr_host.errors import ProgramError
 from cdhr_host.program import Interpreter
+from cdhr_host.values import Command
 
 
 def test_state_and_line_numbers_go_on() -> None:
@@ -48,8 +49,8 @@ def test_a_feed_is_remembered_and_warnings_are_given_once() -> None:
 
 
 def test_nothing_is_yielded_from_the_first_problem_on() -> None:
-    yielded = []
+    yielded: list[Command] = []
+    commands = Interpreter(PAPER_WIDE).commands([b"G1 X5 F600\nM400\nG1 X6\nG6\nM400\nG1 X7\n"])
     with pytest.raises(ProgramError):
-        for command in Interpreter(PAPER_WIDE).commands([b"G1 X5 F600\nM400\nG1 X6\nG6\nM400\nG1 X7\n"]):
-            yielded.append(command)
+        yielded.extend(commands)
     assert shown(yielded) == ["1 move to 5 0 0 at 10", "2 stop"]
