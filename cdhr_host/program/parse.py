@@ -220,7 +220,7 @@ class _Parser:
         self.problems.append(
             Problem(
                 "feed",
-                f"F{word.digits} is no speed: it must be above 0",
+                f"F{word.digits[:40]} is no speed: it must be above 0",
                 self.line,
                 word.column,
                 value=word.value,

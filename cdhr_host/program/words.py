@@ -1,4 +1,17 @@
-"""The table of known words: what each may be followed by, what it means here, what it does."""
+"""The table of known words: what each may be followed by, what it means here, what it does.
+
+The dialect is RepRap's as Marlin speaks it, with these choices:
+
+* A program starts as G21 G90 M82, E 0, with no F. G0 before any F goes at the machine's
+  greatest speed; G1 before any F is refused. F is shared by G0 and G1 and may exceed the
+  machine's speed: the planner is slower then, and one warning says so.
+* G90 and G91 are for X Y Z; E follows M82 and M83 only.
+* Clay never goes back: negative E is a debt that later E pays first; the excess is clay.
+* G4 P is in ms and S in s; G92 never moves the machine's limits; G28 is the machine as a whole.
+* Air words hold a pressure along the moves that follow, whatever the speed; [air] says which.
+* There is no heater, no second nozzle, no file store, and motors never let go.
+* What is not in the table is refused, and so is a letter that its row does not list.
+"""
 
 import difflib
 from collections.abc import Callable
