@@ -2,7 +2,7 @@
 
 import copy
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,8 +13,8 @@ from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.planner import Planner
 from cdhr_host.pipeline.audit import Audit, on_bed
 from cdhr_host.profile import Profile
-from cdhr_host.program import Interpreter
-from cdhr_host.values import Command, Pause, Setpoints, ToolTrack
+from cdhr_host.program import Interpreter, Modal
+from cdhr_host.values import Array, Command, Pause, Setpoints, ToolTrack
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,9 +37,9 @@ class Staircase:
         self._cables = Cables.from_profile(profile)
         self._loads = Loads.from_profile(profile)
         self._period = profile.drives.period if rate_hz is None else 1.0 / rate_hz
-        limits = MotionLimits.from_profile(profile, direction_change_bound(profile))
+        self._limits = MotionLimits.from_profile(profile, direction_change_bound(profile))
         self._audit = Audit(profile)
-        self._planner = Planner(limits, self._period, self._cables.reference_G)
+        self._planner = Planner(self._limits, self._period, self._cables.reference_G)
         self._interpreter = Interpreter(profile, at_G=self._cables.reference_G)
 
     @property
@@ -47,12 +47,24 @@ class Staircase:
         """Lines read so far."""
         return self._interpreter.lines
 
+    @property
+    def modal(self) -> Modal:
+        """What the next line inherits from those read so far."""
+        return self._interpreter.modal
+
+    def stand_at(self, at_G: Array) -> None:
+        """The machine was stopped on its way and stands at (3,) m; modal state stays otherwise."""
+        x, y, z = at_G.tolist()
+        self._planner = Planner(self._limits, self._period, at_G)
+        self._interpreter.modal = replace(self._interpreter.modal, position=(x, y, z))
+
     def walk(self, chunks: Iterable[bytes]) -> Iterator[Command | Checked]:
         """Each command of a text, followed by the setpoints it settles; ends at rest.
 
         Before a Pause comes everything up to rest. Raises ProgramError, after the last line,
         for text that is not understood.
         """
+        self._audit = Audit(self.profile)
         for command in self._interpreter.commands(chunks):
             for track in self._planner.tracks(command):
                 yield self._checked(track)
@@ -71,7 +83,7 @@ class Staircase:
 
     def prepare(self, chunks: Iterable[bytes]) -> list[Setpoints]:
         """All setpoints of a short text, or a refusal that leaves the machine as it was."""
-        planner, modal = copy.copy(self._planner), self._interpreter.modal
+        planner, modal = copy.deepcopy(self._planner), self._interpreter.modal
         try:
             return list(self.setpoints(chunks))
         except BaseException:
