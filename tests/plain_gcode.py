@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))?")
-LEAST_MM3 = 1e-4
+LEAST_MM3 = 1e-6
 
 
 @dataclass
@@ -157,6 +157,7 @@ class Pen:
         self.at = self.nozzle[rows[-1]].copy() if len(rows) else np.zeros(3)
         self.offset = np.zeros(3)
         self.free.append(line)
+        self.moves.append((line, self.at, self.at, np.zeros(3), 0.0, math.inf, False))
 
     def shift(self, words: dict[str, float]) -> None:
         """G92."""

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cdhr_host.cli.machine import open_machine
 from cdhr_host.cli.options import Json, ProfileName, examples
-from cdhr_host.cli.proving import open_machine
 from cdhr_host.cli.refusals import about, emit
 from cdhr_host.units import MM
 

@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
+from cdhr_host.cli.machine import check_log, open_machine
 from cdhr_host.cli.options import Json, LogPath, ProfileName, examples
-from cdhr_host.cli.proving import check_log, open_machine, proven, tell_problems
+from cdhr_host.cli.proving import proven, tell_problems
 from cdhr_host.cli.refusals import Refusal, about, emit
 from cdhr_host.cli.source import Source
 

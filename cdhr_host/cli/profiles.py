@@ -26,7 +26,8 @@ Name = Annotated[str, typer.Argument(metavar="P", help="Name of an installed pro
 @app.command("list", epilog=examples("cdhr profile list", "cdhr profile list --json"))
 def list_(json_: Json = False) -> None:
     """The installed profiles."""
-    from cdhr_host.pipeline import open_profile, profile_names
+    from cdhr_host.pipeline import open_profile
+    from cdhr_host.profile import profile_names
 
     rows = [(name, open_profile(name).machine, path) for name, path in profile_names().items()]
     if json_:
@@ -65,7 +66,8 @@ def check(
 ) -> None:
     """Read profiles and list everything wrong with them; exit code 3 when there is anything."""
     from cdhr_host.errors import ProfileError
-    from cdhr_host.pipeline import open_profile, profile_names
+    from cdhr_host.pipeline import open_profile
+    from cdhr_host.profile import profile_names
 
     refusals = []
     for name in names or profile_names():

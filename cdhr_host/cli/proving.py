@@ -5,33 +5,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cdhr_host.cli.progress import Progress, clock_text
-from cdhr_host.cli.refusals import Refusal, about, problem_lines, say, writing
+from cdhr_host.cli.refusals import problem_lines, say, writing
 from cdhr_host.cli.source import Source
 
 if TYPE_CHECKING:
     from cdhr_host.pipeline import Proof
     from cdhr_host.profile import Profile
     from cdhr_host.values import Setpoints
-
-
-def open_machine(profile: str) -> "Profile":
-    """The profile; its refusals name it."""
-    from cdhr_host.pipeline import open_profile
-
-    with about(profile):
-        return open_profile(profile)
-
-
-def check_log(log: Path | None) -> None:
-    """Refuse a log that could not be written, before any work."""
-    if log is None:
-        return
-    from cdhr_host.report.log import LogTargetError, check_target
-
-    try:
-        check_target(log)
-    except LogTargetError as error:
-        raise Refusal(f"cdhr: error: --log {log}: {error}") from error
 
 
 def proven(

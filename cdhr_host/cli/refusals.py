@@ -1,8 +1,9 @@
 """What ends a command early: one place turns every refusal into words and an exit code."""
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -29,11 +30,9 @@ def place(problem: Problem, source: str) -> str:
     return ":".join(parts)
 
 
-def problem_lines(
-    problems: tuple[Problem, ...] | list[Problem], total: int, source: str, kind: str = "error"
-) -> Iterator[str]:
+def problem_lines(problems: Sequence[Problem], total: int, source: str, kind: str = "error") -> Iterator[str]:
     """One line a problem; a hint shared by neighbours stands once, after the last of them."""
-    for problem, following in zip(problems, [*problems[1:], None], strict=True):
+    for problem, following in zip_longest(problems, problems[1:]):
         yield f"{place(problem, source)}: {kind}: {problem.message}"
         if problem.hint and (following is None or following.hint != problem.hint):
             yield f"hint: {problem.hint}"

@@ -1,7 +1,9 @@
 """A run in words and as a record for machines."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
+
+import numpy as np
 
 from cdhr_host import __version__
 from cdhr_host.job import RunSummary
@@ -45,3 +47,21 @@ def run_lines(run: RunSummary, proof: Proof, file: str) -> Iterator[str]:
     away, torque = run.following_max / MM, run.torque_max
     yield f"  following  {away.max():.3f} mm at most (slider {away.argmax() + 1})"
     yield f"  torque     {torque.max():.3f} N m at most (motor {torque.argmax() + 1})"
+
+
+def joined(runs: Sequence[RunSummary]) -> RunSummary:
+    """The summary of runs that followed each other, such as those between two pauses."""
+    ticks = np.array([run.ticks for run in runs])
+    squares = np.array([run.following_rms**2 for run in runs])
+    last = next((run for run in reversed(runs) if run.ticks), runs[-1])
+    return RunSummary(
+        ticks=int(ticks.sum()),
+        duration=sum(run.duration for run in runs),
+        last_tick=last.last_tick,
+        last_line=last.last_line,
+        following_max=np.max([run.following_max for run in runs], axis=0),
+        following_rms=np.sqrt(ticks @ squares / max(ticks.sum(), 1)),
+        torque_max=np.max([run.torque_max for run in runs], axis=0),
+        pressure_deviation_max=max(run.pressure_deviation_max for run in runs),
+        interrupted=runs[-1].interrupted,
+    )

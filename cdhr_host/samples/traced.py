@@ -8,15 +8,17 @@ from cdhr_host.samples.words import DECIMALS, word, words
 from cdhr_host.units import MINUTE, MM
 from cdhr_host.values import Array
 
+LEAST_MM = 0.05
+"""no move is shorter, so that the rounding of its ends does not bend the path"""
 TRAVEL_SPEED = 20 * MM
 """m/s to where the law begins"""
 
 
 def _thinned(t: Array, position_mm: Array) -> Iterator[tuple[float, Array]]:
-    """(time taken, end) of each move; samples that round to the same place are one."""
+    """(time taken, end) of each move; samples too near to the last one are passed over."""
     began, last = t[0], position_mm[0]
     for now, place in zip(t[1:], position_mm[1:], strict=True):
-        if np.any(place != last):
+        if np.linalg.norm(place - last) >= LEAST_MM:
             yield now - began, place
             began, last = now, place
 

@@ -61,7 +61,7 @@ def test_a_traced_law_keeps_its_places_and_its_time(equation: str) -> None:
     t = law.times(0.5)
     moves = [words(line) for line in traced(t, law.position(t)) if line.startswith("G1")]
     places = np.array([[move[axis] for axis in "XYZ"] for move in moves])
-    np.testing.assert_allclose(places[-1], law.position(t[-1:])[0] / MM, atol=1e-5)
+    np.testing.assert_allclose(places[-1], law.position(t[-1:])[0] / MM, atol=0.05)
     lengths = np.linalg.norm(np.diff(places, axis=0, prepend=law.position(t[:1]) / MM), axis=1)
     taken = sum(length / move["F"] * 60 for length, move in zip(lengths, moves, strict=True))
     assert taken == pytest.approx(law.duration, rel=1e-3)
@@ -74,9 +74,9 @@ def test_a_law_that_does_not_begin_at_the_reference_is_travelled_to() -> None:
     assert lines[3] == "G1 X10 Y1 Z0 F60"
 
 
-def test_samples_in_the_same_place_are_one_move() -> None:
+def test_samples_too_near_to_each_other_are_one_move() -> None:
     t = np.array([0.0, 1.0, 2.0, 3.0])
-    lines = list(traced(t, np.array([[0, 0, 0], [0, 0, 0], [0, 0, 1e-12], [0.003, 0, 0]])))
+    lines = list(traced(t, np.array([[0, 0, 0], [0, 0, 0], [4e-5, 0, 0], [0.003, 0, 0]])))
     assert [line for line in lines if line.startswith("G1")] == ["G1 X3 Y0 Z0 F60"]
 
 

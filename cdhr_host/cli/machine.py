@@ -1,0 +1,43 @@
+"""The machine a command works on: its profile, its drives, its log."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cdhr_host.cli.refusals import Refusal, about
+
+if TYPE_CHECKING:
+    from cdhr_host.drives import Clock, MachineLink
+    from cdhr_host.profile import Profile
+
+SIMULATED = "loopback:"
+
+
+def open_machine(profile: str) -> "Profile":
+    """The profile; its refusals name it."""
+    from cdhr_host.pipeline import open_profile
+
+    with about(profile):
+        return open_profile(profile)
+
+
+def opened(drives: str, machine: "Profile", speed: float) -> "tuple[MachineLink, Clock]":
+    """The link and the clock it runs by; raises DriveError, Refusal for a speed real drives lack."""
+    from cdhr_host.drives import MonotonicClock, PacedClock, open_link
+
+    simulated = drives == SIMULATED
+    if speed != 1.0 and not simulated:
+        raise Refusal("cdhr: error: --speed is for simulated drives only\nhint: use M220 to print faster")
+    clock = PacedClock(speed) if simulated else MonotonicClock()
+    return open_link(drives, machine, clock), clock
+
+
+def check_log(log: Path | None) -> None:
+    """Refuse a log that could not be written, before any work."""
+    if log is None:
+        return
+    from cdhr_host.report.log import LogTargetError, check_target
+
+    try:
+        check_target(log)
+    except LogTargetError as error:
+        raise Refusal(f"cdhr: error: --log {log}: {error}") from error
