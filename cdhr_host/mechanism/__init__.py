@@ -8,7 +8,7 @@ from cdhr_host.mechanism import trajectories
 from cdhr_host.mechanism.bounds import direction_change_bound
 from cdhr_host.mechanism.cables import Cables, Loads
 from cdhr_host.mechanism.consistency import inconsistencies
-from cdhr_host.mechanism.forward import forward, uncompensated_error
+from cdhr_host.mechanism.forward import forward, mistaken_error, model_errors, uncompensated_error
 from cdhr_host.mechanism.kinematics import jacobian, lengths, reachable, slider, uncompensated_lengths
 from cdhr_host.mechanism.state import cable_state
 from cdhr_host.mechanism.statics import tensions
@@ -22,6 +22,8 @@ __all__ = [
     "inconsistencies",
     "jacobian",
     "lengths",
+    "mistaken_error",
+    "model_errors",
     "reachable",
     "slider",
     "tensions",

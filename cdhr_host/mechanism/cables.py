@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from cdhr_host.mechanism.pulley import Pulley, SwivelWrap
+from cdhr_host.mechanism.pulley import PULLEYS, Pulley
 from cdhr_host.profile import Profile
 from cdhr_host.values import Array
 
@@ -32,12 +32,15 @@ class Cables:
     """(6,) m: cable lengths at the reference pose"""
     reference_G: Array
     """(3,) m: the reference pose in program coordinates; q = position_G - reference_G"""
-    pulley: Pulley = SwivelWrap
+    azimuths: Array
+    """(6,) rad: in which each cable leaves its pulley for the slider"""
+    pulley: Pulley
 
     @classmethod
     def from_profile(cls, profile: Profile) -> "Cables":
         """Table A1 as the profile gives it; the profile must be free of inconsistencies."""
         shape, bed = profile.geometry, profile.bed
+        pulley = PULLEYS[shape.pulley_model]
         top = shape.reference_height + shape.reference_separation
         anchors = [
             *_ring(shape.pulley_circle_radius, shape.lower_pulley_height),
@@ -54,12 +57,14 @@ class Cables:
             pulley_radius=shape.pulley_radius,
             reference_lengths=_fixed([0.0] * 6),
             reference_G=_fixed([-bed.origin_x, -bed.origin_y, shape.reference_height - bed.origin_z]),
-        ).with_pulley(SwivelWrap)
+            azimuths=_fixed(AZIMUTHS + AZIMUTHS),
+            pulley=pulley,
+        ).with_pulley(pulley)
 
     def with_pulley(self, pulley: Pulley) -> "Cables":
         """The same machine seen through another pulley model."""
         x, y, z = (self.anchors - self.attachments).T
-        wrap = pulley(x, y, z, self.signs, self.pulley_radius)
+        wrap = pulley(x, y, z, self.signs, self.pulley_radius, self.azimuths)
         return replace(self, pulley=pulley, reference_lengths=_fixed(wrap.length()))
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.mechanism.cables import LOWER, UPPER, Cables
-from cdhr_host.mechanism.kinematics import block_rows, slider, uncompensated_lengths, wraps_of
-from cdhr_host.mechanism.pulley import PointWrap, Vector
+from cdhr_host.mechanism.kinematics import block_rows, lengths, slider, wraps_of
+from cdhr_host.mechanism.pulley import PULLEYS, PointWrap, Pulley, Vector
 from cdhr_host.mechanism.statics import cofactors
 from cdhr_host.units import MM
 from cdhr_host.values import Array
@@ -45,10 +45,33 @@ def uncompensated_error(cables: Cables, lower: Array, upper: Array) -> tuple[Arr
     The machine with pulleys is commanded |BA| counted from the reference. Raises like
     ``lengths`` and ``forward``.
     """
-    point = cables.with_pulley(PointWrap)
-    commanded = cables.reference_lengths + slider(point, uncompensated_lengths(cables, lower, upper))
+    return mistaken_error(cables, PointWrap, lower, upper)
+
+
+def mistaken_error(cables: Cables, believed: Pulley, lower: Array, upper: Array) -> tuple[Array, Array]:
+    """(N, 3), (N, 3) -> (N, 3), (N, 3): errors of both platforms, m, where ``cables`` is the machine.
+
+    Setpoints are computed with the pulley model ``believed``. Raises like ``lengths`` and ``forward``.
+    """
+    planned = cables.with_pulley(believed)
+    commanded = cables.reference_lengths + slider(planned, lengths(planned, lower, upper))
     reached = forward(cables, commanded)
     return reached[0] - lower, reached[1] - upper
+
+
+def model_errors(cables: Cables, lower: Array, upper: Array) -> dict[tuple[str, str], Array]:
+    """(N, 3), (N, 3) -> {(believed, actual): (3,)}: greatest nozzle error along x, y, z, m.
+
+    Setpoints by one pulley model on a machine that behaves like another, for every pair in
+    ``PULLEYS``. Raises like ``lengths`` and ``forward``.
+    """
+    return {
+        (believed, actual): np.abs(mistaken_error(cables.with_pulley(real), model, lower, upper)[0]).max(
+            axis=0
+        )
+        for believed, model in PULLEYS.items()
+        for actual, real in PULLEYS.items()
+    }
 
 
 def _newton(cables: Cables, which: Sequence[int], wanted: Array) -> Vector:

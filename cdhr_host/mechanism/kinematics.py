@@ -98,9 +98,9 @@ def _require_reach(wraps: Sequence[Wrap], start: int) -> None:
 
 def _wrap(cables: Cables, i: int, q: Vector) -> Wrap:
     x, y, z = cables.anchors[i] - cables.attachments[i]
-    sign, radius = float(cables.signs[i]), cables.pulley_radius
+    sign, azimuth = float(cables.signs[i]), float(cables.azimuths[i])
     with np.errstate(invalid="ignore"):
-        return cables.pulley(x - q[0], y - q[1], z - q[2], sign, radius)
+        return cables.pulley(x - q[0], y - q[1], z - q[2], sign, cables.pulley_radius, azimuth)
 
 
 def _out_of_reach(i: int, reach: Array, start: int) -> Problem:

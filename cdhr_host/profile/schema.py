@@ -99,6 +99,18 @@ class Geometry(_Section):
         ),
         IN_MM,
     ]
+    pair_spacing: Annotated[
+        float, key("pair_spacing_mm", "distance between the two cables of a lower pair", gt=0, le=1e4), IN_MM
+    ] = 110.0 * MM
+    nozzle_length: Annotated[
+        float, key("nozzle_length_mm", "lower attachment plane above the nozzle's tip", gt=0, le=1e4), IN_MM
+    ] = 200.0 * MM
+    pulley_model: Annotated[
+        Literal["swivel", "fixed-plane", "caster", "point"],
+        Field(
+            description="how the pulleys are hung: about the vertical, not at all, about the cable, or none"
+        ),
+    ] = "swivel"
 
 
 class Spring(_Section):
@@ -106,6 +118,15 @@ class Spring(_Section):
 
     stiffness: Annotated[float, key("stiffness_n_mm", "stiffness", gt=0, le=1e4), IN_N_MM]
     rest_length: Annotated[float, key("rest_length_mm", "length without force", ge=0, le=1e4), IN_MM]
+    policy: Annotated[
+        Literal["fixed", "preload", "vertical", "free"],
+        Field(
+            description="where the upper platform stands: constant offset, constant force, best height, best place"
+        ),
+    ] = "fixed"
+    preload: Annotated[
+        float, key("preload_n", "spring force that the policy preload holds", gt=0, le=1e5)
+    ] = 30.0
 
 
 class Platforms(_Section):
@@ -124,6 +145,32 @@ class Forces(_Section):
     lower_max: Annotated[float, key("lower_max_n", "greatest force of cables 1-3", gt=0, le=1e5)]
     upper_min: Annotated[float, key("upper_min_n", "least force of cables 4-6", ge=0, le=1e5)]
     upper_max: Annotated[float, key("upper_max_n", "greatest force of cables 4-6", gt=0, le=1e5)]
+    single_min: Annotated[
+        float, key("single_min_n", "least force of one cable of a lower pair", ge=0, le=1e5)
+    ] = 0.0
+    single_max: Annotated[
+        float, key("single_max_n", "greatest force of one cable of a lower pair", gt=0, le=1e5)
+    ] = 1e5
+
+
+class Stretch(_Section):
+    """[stretch]: cables that give under load."""
+
+    compensation: Annotated[
+        Literal["off", "on"], Field(description="whether setpoints allow for the cables' stretch")
+    ] = "off"
+    stiffness: Annotated[
+        float, key("stiffness_n", "EA of one cable: force for doubling its length", gt=0, le=1e9)
+    ] = 30e3
+    stiffness_doubt: Annotated[
+        float, key("stiffness_doubt_percent", "how far EA may be off", ge=0, lt=100), _to_si(0.01)
+    ] = 0.2
+    lower_dead_length: Annotated[
+        float, key("lower_dead_length_mm", "cable between pulley and slider, cables 1-3", ge=0, le=1e5), IN_MM
+    ] = 1.0
+    upper_dead_length: Annotated[
+        float, key("upper_dead_length_mm", "cable between pulley and slider, cables 4-6", ge=0, le=1e5), IN_MM
+    ] = 1.0
 
 
 class Sliders(_Section):
@@ -276,6 +323,7 @@ class Profile(_Section):
     spring: Spring
     platforms: Platforms
     forces: Forces
+    stretch: Stretch = Stretch()
     sliders: Sliders
     limits: Limits
     path: PathRules
