@@ -315,6 +315,87 @@ class Drives(_Section):
     ]
 
 
+class CanOpen(_Section):
+    """[canopen]: six CiA 402 drives on nodes 1-6 and one CiA 401 coupler on node 7."""
+
+    mode: Annotated[Literal["csp", "ip"], Field(description="cyclic position mode: 8 (csp) or 7 (ip)")]
+    position_unit: Annotated[
+        float, key("position_unit_mm", "slider travel in one position unit of the drives", gt=0, le=1), IN_MM
+    ]
+    drive_vendor: Annotated[int, Field(description="0x1018:1 of the drives", ge=0, lt=2**32)]
+    drive_product: Annotated[int, Field(description="0x1018:2 of the drives", ge=0, lt=2**32)]
+    drive_serials: Annotated[
+        list[int], Field(description="0x1018:4 of nodes 1-6; empty takes any", max_length=6)
+    ]
+    io_vendor: Annotated[int, Field(description="0x1018:1 of the coupler", ge=0, lt=2**32)]
+    io_product: Annotated[int, Field(description="0x1018:2 of the coupler", ge=0, lt=2**32)]
+    sync_counter: Annotated[bool, Field(description="SYNC carries a counter where every node accepts 0x1019")]
+    feedback_every: Annotated[int, Field(description="drives answer every n-th SYNC", ge=1, le=8)]
+    heartbeat: Annotated[
+        float,
+        key("heartbeat_ms", "silence after which host and nodes give each other up", ge=20, le=5e3),
+        IN_MS,
+    ]
+    setpoint_watchdog: Annotated[
+        float,
+        key("setpoint_watchdog_ms", "silence after which a drive stops by itself; 0 has none", ge=0, le=1e3),
+        IN_MS,
+    ]
+    quick_stop: Annotated[
+        float, key("quick_stop_mm_s2", "deceleration of a drive's own quick stop", gt=0, le=1e7), IN_MM
+    ]
+    rated_torque: Annotated[float, key("rated_torque_nm", "rated motor torque, 0x6076", gt=0, le=1e3)]
+    brake_release: Annotated[
+        float, key("brake_release_ms", "time a brake takes to open after enabling", ge=0, le=5e3), IN_MS
+    ]
+    reference: Annotated[
+        Literal["drive", "stored", "homing"],
+        Field(description="what knows the reference pose: the drive, a stored offset, or homing (mode 6)"),
+    ]
+    homing_method: Annotated[int, Field(description="0x6098 of homing", ge=-128, le=127)]
+    homing_speed: Annotated[float, key("homing_speed_mm_s", "speed of homing, 0x6099", gt=0, le=1e3), IN_MM]
+    homing_torque: Annotated[
+        float, key("homing_torque_percent", "torque limit while homing", gt=0, le=300), _to_si(0.01)
+    ]
+    link_loss_tested: Annotated[
+        bool, Field(description="bench test passed: drives without 0x6007 stop when the host falls silent")
+    ]
+    pressure_full_scale: Annotated[
+        float,
+        key("pressure_full_scale_kpa", "pressure at raw 32767 of output 1 and input 1", gt=0, le=1e4),
+        IN_KPA,
+    ]
+    pressure_deviation: Annotated[
+        float,
+        key("pressure_deviation_kpa", "pressure away from its command that stops", gt=0, le=1e4),
+        IN_KPA,
+    ]
+    pressure_settling: Annotated[
+        float, key("pressure_settling_ms", "time such a deviation may last", ge=0, le=6e4), IN_MS
+    ]
+    force_full_scale: Annotated[
+        float, key("force_full_scale_n", "cable force at raw 32767 of inputs 2-4", gt=0, le=1e6)
+    ]
+    jitter_test: Annotated[
+        float, key("jitter_test_ms", "length of the sender's timing test before arming", ge=0, le=6e4), IN_MS
+    ]
+    allow_soft_realtime: Annotated[
+        bool, Field(description="arm although the timing test failed, with a warning")
+    ]
+
+
+class Link(_Section):
+    """[link]: the framed serial link to a motion bridge."""
+
+    watchdog: Annotated[
+        float, key("watchdog_ms", "silence after which the bridge stops by itself", ge=20, le=5e3), IN_MS
+    ]
+    ramp: Annotated[float, key("ramp_ms", "length of the bridge's time-scaled stop", ge=10, le=5e3), IN_MS]
+    pressure_hold: Annotated[
+        float, key("pressure_hold_ms", "longest time air outlives its setpoint", ge=1, le=5e3), IN_MS
+    ]
+
+
 class Profile(_Section):
     """One machine, frozen, in SI."""
 
@@ -331,3 +412,5 @@ class Profile(_Section):
     extruder: Extruder
     air: Air
     drives: Drives
+    canopen: CanOpen
+    link: Link
