@@ -6,6 +6,7 @@ with what follows. So memory stays bounded however long a leg is, and the result
 depend on when segments arrived.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.motion.limits import Cells, MotionLimits, cells
 from cdhr_host.motion.look_ahead import border_speeds
-from cdhr_host.motion.smooth_path import SmoothPath, smooth
+from cdhr_host.motion.smooth_path import STRAIGHT, SmoothPath, smooth
 from cdhr_host.motion.time_law import TimeLaw, time_law
 from cdhr_host.units import MM
 from cdhr_host.values import Array, Flags, Ints
@@ -82,9 +83,10 @@ class LegPlanner:
         self._limits = limits
         self._segments: Segments | None = None
         self._planned = 0
-        self._opens = True
-        self._first = -limits.half_width
-        self._entry: float | None = None
+        self._started = False
+        self._opens = False
+        self._first = 0.0
+        self._entry: float | None = 0.0
         self._inside = False
 
     def add(self, segments: Segments) -> None:
@@ -101,14 +103,17 @@ class LegPlanner:
         segments = self._segments
         if segments is None:
             return None
-        path = smooth(segments.points, self._limits.half_width, opens=self._opens, closes=closes)
-        last = path.end if closes else path.end - self._limits.half_width
+        if not self._started:
+            self._start(segments)
+        h = self._limits.half_width
+        rounded = closes and _room(segments.points[::-1], h) < h
+        path = smooth(segments.points, h, opens=self._opens, closes=rounded)
         self._planned = len(segments)
-        if last <= self._first:
+        span = (self._first, path.end if closes else path.end - h)
+        if span[1] <= span[0]:
             return None
-        span = (self._first, last)
         found = cells(path, segments.feed[path.segment], span, self._limits, inside=self._inside)
-        speeds, forward = border_speeds(found, self._entry, None if closes else 0.0)
+        speeds, forward = border_speeds(found, self._entry, None if rounded else 0.0)
         self._check_entry(speeds[0])
         count = len(found.start) if closes else _settled(found, speeds == forward)
         if count == 0:
@@ -118,13 +123,18 @@ class LegPlanner:
             self._advance(found, count, float(speeds[count]))
         return leg
 
+    def _start(self, segments: Segments) -> None:
+        """Begin at rest in time where the path begins straight, else at rest in s."""
+        self._started = True
+        if _room(segments.points, self._limits.half_width) < self._limits.half_width:
+            self._opens, self._first, self._entry = True, -self._limits.half_width, None
+
     def _advance(self, found: Cells, count: int, speed: float) -> None:
         """Forget what is committed, but for the path the kernel still reaches back to."""
         segments = self._segments
         assert segments is not None
         border = float(found.start[count])
-        steps = np.diff(segments.points, axis=0)
-        drawn = np.concatenate(([0.0], np.cumsum(np.sqrt(np.einsum("nk,nk->n", steps, steps)))))
+        drawn = np.concatenate(([0.0], np.cumsum(_lengths(np.diff(segments.points, axis=0)))))
         reach = border - self._limits.half_width
         first = max(int(np.searchsorted(drawn, reach, side="right")) - 1, 0)
         self._segments = segments.part(first, len(segments))
@@ -145,6 +155,22 @@ class LegPlanner:
                     hint="please report this as a bug, with the program",
                 )
             )
+
+
+def _room(points: Array, enough: float) -> float:
+    """(M+1, 3) m -> m from the first point to the first corner, infinite if there is none."""
+    near = int(np.searchsorted(np.cumsum(_lengths(np.diff(points, axis=0))), enough)) + 2
+    steps = np.diff(points[: near + 1], axis=0)
+    lengths = _lengths(steps)
+    direction = steps / lengths[:, None]
+    corners = np.flatnonzero(_lengths(np.diff(direction, axis=0)) > STRAIGHT)
+    return float(lengths[: corners[0] + 1].sum()) if len(corners) else math.inf
+
+
+def _lengths(steps: Array) -> Array:
+    """(M, 3) -> (M,)."""
+    found: Array = np.sqrt(np.einsum("nk,nk->n", steps, steps))
+    return found
 
 
 def _settled(found: Cells, final: Flags) -> int:

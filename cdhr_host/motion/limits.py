@@ -162,7 +162,8 @@ def _between(path: SmoothPath, feed: Array, span: tuple[float, float]) -> _Piece
 def _groups(pieces: _Pieces, h: float, *, inside: bool) -> tuple[Ints, Flags]:
     """(K,) cell number of each piece, and whether its bend is long.
 
-    A short bend is one cell, a long one many; straights split where the feed changes.
+    A short bend is one cell, a long one many; straights split where the feed changes, and
+    every MERGE.
     """
     bent, start = pieces.bent, pieces.start
     run = np.cumsum(np.diff(bent, prepend=bent[0]) != 0)
@@ -173,7 +174,9 @@ def _groups(pieces: _Pieces, h: float, *, inside: bool) -> tuple[Ints, Flags]:
         roomy |= bent & (run == 0)
     part = np.where(roomy, np.floor((start - start[heads][run]) / (CELL * h)), 0.0)
     part = np.where(bent, part, np.cumsum(np.diff(pieces.feed, prepend=pieces.feed[0]) != 0))
-    change = (np.diff(run, prepend=run[0]) != 0) | (np.diff(part, prepend=part[0]) != 0)
+    stretch = np.where(bent, 0.0, np.floor((start - start[0]) / MERGE))
+    columns = np.stack((run, part, stretch))
+    change = (np.diff(columns, prepend=columns[:, :1]) != 0).any(axis=0)
     return np.cumsum(change), roomy
 
 

@@ -73,9 +73,8 @@ class Planner:
         yield from self._stand(command.clay / command.flow, command.flow, command.line)
 
     @_take.register(Pause | Stop)
-    def _(self, command: Pause | Stop) -> Iterator[ToolTrack]:
-        yield from self._close()
-        self._line = command.line
+    def _(self, _: Pause | Stop) -> Iterator[ToolTrack]:
+        return self._close()
 
     @_take.register
     def _(self, _: Notice) -> Iterator[ToolTrack]:

@@ -24,9 +24,16 @@ def speed_change(v0: float, v1: float, a: float, j: float) -> tuple[list[float],
     """
     _request.current_velocity, _request.target_velocity = [v0], [v1]
     _request.max_acceleration, _request.max_jerk = [a], [j]
-    result = _solver.calculate(_request, _answer)
+    try:
+        result = _solver.calculate(_request, _answer)
+    except ruckig.RuckigError as error:
+        raise _unplannable(v0, v1, a, j, str(error)) from error
     if result not in (ruckig.Result.Working, ruckig.Result.Finished):
-        message = f"no speed change from {v0!r} to {v1!r} m/s with {a!r} m/s² and {j!r} m/s³: {result}"
-        raise MotionError(Problem("unplannable", message, hint="please report this as a bug"))
+        raise _unplannable(v0, v1, a, j, str(result))
     profile = _answer.profiles[0][0]
     return profile.t, profile.j
+
+
+def _unplannable(v0: float, v1: float, a: float, j: float, why: str) -> MotionError:
+    message = f"no speed change from {v0!r} to {v1!r} m/s with {a!r} m/s² and {j!r} m/s³: {why.strip()}"
+    return MotionError(Problem("unplannable", message, hint="please report this as a bug"))

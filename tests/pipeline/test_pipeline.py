@@ -1,0 +1,180 @@
+"""The staircase as a whole: what comes out, what is refused, and the proof's numbers."""
+
+import math
+
+import numpy as np
+import pytest
+
+from cdhr_host.errors import MotionError, ProgramError
+from cdhr_host.mechanism import Cables, lengths
+from cdhr_host.pipeline import Checked, Staircase, open_profile, prove
+from cdhr_host.pipeline.columns import SETPOINT_COLUMNS, setpoint_columns
+from cdhr_host.units import MM, MM3
+from cdhr_host.values import Pause, Setpoints
+
+
+@pytest.fixture(scope="module")
+def paper():
+    return open_profile("paper")
+
+
+@pytest.fixture(scope="module")
+def wide():
+    return open_profile("paper-wide")
+
+
+def joined(blocks):
+    blocks = list(blocks)
+    return {name: np.concatenate([getattr(block, name) for block in blocks]) for name in Setpoints.__slots__}
+
+
+SQUARE = b"G21\nG90\nM83\nG1 Z5 F1200\nG1 X30 E100\nG1 Y30 E100\nG4 P100\nG1 X0 Y0 F3000\n"
+
+
+def test_sliders_are_the_mechanisms_lengths_less_the_reference(paper):
+    rows = joined(Staircase(paper).setpoints([SQUARE]))
+    cables = Cables.from_profile(paper)
+    q = rows["nozzle_G"] - cables.reference_G
+    assert np.array_equal(rows["slider"], lengths(cables, q, q) - cables.reference_lengths)
+    assert np.array_equal(rows["upper"], q)
+    assert not rows["slider"][0].any()
+
+
+def test_time_is_tick_times_period_and_rate_only_resamples(paper):
+    coarse = joined(Staircase(paper).setpoints([SQUARE]))
+    fine = joined(Staircase(paper, rate_hz=1000.0).setpoints([SQUARE]))
+    assert np.array_equal(coarse["tick"], np.arange(len(coarse["tick"])))
+    assert np.array_equal(coarse["t"], coarse["tick"] * 0.004)
+    assert np.abs(fine["nozzle_G"][::4][: len(coarse["tick"]) - 1] - coarse["nozzle_G"][:-1]).max() < 1e-12
+
+
+def test_air_is_off_on_travel_dwell_and_at_both_ends(paper):
+    rows = joined(Staircase(paper).setpoints([SQUARE]))
+    printing = np.isin(rows["line"], [5, 6])
+    moving = np.linalg.norm(np.diff(rows["nozzle_G"], axis=0, prepend=rows["nozzle_G"][:1]), axis=1) > 1e-9
+    assert (rows["pressure"][printing & moving] > 0).all()
+    assert not rows["pressure"][~printing].any()
+    assert rows["pressure"][0] == rows["pressure"][-1] == 0.0
+
+
+def test_programs_follow_each_other_from_rest_to_rest(paper):
+    machine = Staircase(paper)
+    first = machine.prepare([b"G1 X10 F1200\n"])
+    second = machine.prepare([b"G91\nG1 X5\n"])
+    assert second[0].tick[0] == first[-1].tick[-1] + 1
+    assert second[-1].nozzle_G[-1] / MM == pytest.approx([15, 0, 0], abs=1e-9)
+
+
+def test_refused_text_leaves_the_machine_as_it_was(paper):
+    machine = Staircase(paper)
+    machine.prepare([b"G91\nG1 X10 F1200\n"])
+    with pytest.raises(MotionError, match="bed"):
+        machine.prepare([b"G90\nG1 X5000\n"])
+    with pytest.raises(ProgramError):
+        machine.prepare([b"G6\n"])
+    rows = machine.prepare([b"G1 X5\n"])
+    assert rows[0].nozzle_G[0] / MM == pytest.approx([10, 0, 0], abs=1e-3)
+    assert rows[-1].nozzle_G[-1] / MM == pytest.approx([15, 0, 0], abs=1e-9)
+
+
+def test_pause_comes_after_everything_up_to_rest(paper):
+    steps = list(Staircase(paper).walk([b"G1 X5 F600\nM0 look\nG1 X0\n"]))
+    at = next(i for i, step in enumerate(steps) if isinstance(step, Pause))
+    before = joined(step.setpoints for step in steps[:at] if isinstance(step, Checked))
+    assert before["nozzle_G"][-1] / MM == pytest.approx([5, 0, 0], abs=1e-9)
+    assert np.allclose(before["slider"][-1], before["slider"][-2], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "limit", "line"),
+    [
+        (b"G1 Z5 F1200\nG1 X400\n", "bed", 320.0, 2),
+        (b"G1 Z-1 F1200\n", "bed", 0.0, 1),
+        (b"G1 Z900 F1200\n", "bed", 800.0, 1),
+        (b"G1 X300 F1200\n", "force", 12.0, 1),
+        (b"M83\nG1 X100 E5000 F1200\n", "pressure", 200.0, 2),
+    ],
+)
+def test_what_the_machine_cannot_do_is_named_with_line_number_and_limit(paper, text, kind, limit, line):
+    proof = prove([text], paper)
+    assert not proof.ok
+    problem = next(problem for problem in proof.problems if problem.kind == kind)
+    assert problem.line == line
+    assert problem.limit == pytest.approx(limit)
+    assert problem.hint
+    with pytest.raises(MotionError):
+        list(Staircase(paper).setpoints([text]))
+
+
+def test_force_refusals_name_cable_and_worst_force(paper, wide):
+    text = b"G1 X180 Y180 F3000\nG1 X0 Y0\n"
+    problems = prove([text], paper).problems
+    assert {problem.line for problem in problems} == {1, 2}
+    assert all(problem.kind == "force" for problem in problems)
+    assert len({(problem.line, problem.message.split(" would")[0]) for problem in problems}) == len(problems)
+    assert prove([text], wide).ok
+
+
+def test_problems_are_counted_beyond_the_hundred_listed(paper):
+    text = b"".join(b"G1 X%d Y300 F3000\n" % (n % 2) for n in range(300))
+    proof = prove([text], paper)
+    assert len(proof.problems) == 100
+    assert proof.total_problems > 200
+
+
+def test_each_limit_of_the_sliders_is_audited(paper):
+    slow = paper.sliders.model_copy(update={"travel_max": 0.01, "travel_min": -0.005, "speed_max": 0.001})
+    machine = Staircase(paper)
+    machine.profile = paper.model_copy(update={"sliders": slow})
+    kinds = set()
+    for step in machine.walk([b"G1 X50 F3000\n"]):
+        if isinstance(step, Checked):
+            kinds |= {problem.kind for problem in step.problems}
+    assert kinds == {"travel", "slider speed"}
+
+
+def test_slower_sliders_slow_the_nozzle_down(paper):
+    sliders = paper.sliders.model_copy(update={"speed_max": 0.02, "acceleration_max": 0.1, "jerk_max": 1.0})
+    careful = paper.model_copy(update={"sliders": sliders})
+    proof = prove([b"G1 X100 F6000\nG1 Y50\nG1 X0 Y0 Z40\n"], careful, rate_hz=1000.0)
+    assert proof.ok
+    rows = joined(Staircase(careful, rate_hz=1000.0).setpoints([b"G1 X100 F6000\nG1 Y50\nG1 X0 Y0 Z40\n"]))
+    for order, limit in ((1, 0.02), (2, 0.1), (3, 1.0)):
+        assert np.abs(np.diff(rows["slider"], order, axis=0)).max() / 0.001**order <= limit * 1.001
+
+
+def test_proof_counts_what_was_drawn(paper):
+    text = b"M83\n;LAYER:0\nG1 X30 F1200 E60\n;LAYER:1\nG1 Y40 E80\nG2 X30 Y0 I0 J-20 E10\nG1 E5\nM0\n"
+    proof = prove([text], paper)
+    assert proof.ok
+    assert proof.lines == 8
+    assert proof.moves == 4
+    assert proof.path / MM == pytest.approx(30 + 40 + math.pi * 20)
+    assert proof.extruded / MM3 == pytest.approx(155, rel=1e-9)
+    assert proof.layers == ((2, 1), (4, 2))
+    assert proof.pauses == 1
+    assert proof.extremes["x_mm"][2] == pytest.approx(50, abs=0.1)
+    assert set(proof.extremes) == set(SETPOINT_COLUMNS) - {"t_s", "line"}
+
+
+def test_extremes_are_those_of_all_rows(paper):
+    collected = []
+    proof = prove([SQUARE], paper, sink=lambda rows: collected.append(setpoint_columns(rows)))
+    for name, (low, low_line, high, high_line) in proof.extremes.items():
+        values = np.concatenate([block[name] for block in collected])
+        lines = np.concatenate([block["line"] for block in collected])
+        assert (low, high) == (values.min(), values.max())
+        assert low in values[lines == low_line]
+        assert high in values[lines == high_line]
+
+
+def test_sink_gets_nothing_from_the_first_problem_on(paper):
+    collected = []
+    prove([b"G1 X10 F1200\nG4 P100\nG1 X400\n"], paper, sink=collected.append)
+    assert all((rows.nozzle_G[:, 0] <= 0.3201).all() for rows in collected)
+
+
+def test_text_that_is_not_understood_is_refused_whole(paper):
+    with pytest.raises(ProgramError) as caught:
+        prove([b"G1 X10 F1200\nG6\nG1 Xa\n"], paper)
+    assert {problem.line for problem in caught.value.problems} == {2, 3}
