@@ -35,6 +35,14 @@ class Drawing:
         """The last move at or before a line; -1 before the first."""
         return np.searchsorted(self.line, line, "right") - 1
 
+    def places(self, move: int) -> np.ndarray:
+        """(5, 3): evenly along a move, both ends included."""
+        part = np.linspace(0, 1, 5)
+        if self.sweep[move] == 0:
+            return self.start[move] + part[:, None] * (self.end[move] - self.start[move])
+        ends = self.start[move], self.end[move], self.centre[move]
+        return _on_arc(*(np.tile(place, (5, 1)) for place in ends), np.full(5, self.sweep[move]), part)
+
     def distance(self, move: np.ndarray, point: np.ndarray) -> np.ndarray:
         """(N,), (N, 3) -> distance of each point from its move."""
         straight = _to_line(self.start[move], self.end[move], point)
@@ -56,21 +64,28 @@ def _to_line(start: np.ndarray, end: np.ndarray, point: np.ndarray) -> np.ndarra
 def _to_arc(
     start: np.ndarray, end: np.ndarray, centre: np.ndarray, sweep: np.ndarray, point: np.ndarray
 ) -> np.ndarray:
-    """Distance from a helix, at the angle of the point; the radius goes evenly from start to end."""
-    out, back = (start - centre)[:, :2], (end - centre)[:, :2]
+    """Distance from a helix, at the angle of the point."""
+    out = (start - centre)[:, :2]
     first = np.arctan2(out[:, 1], out[:, 0])
     seen = np.arctan2(point[:, 1] - centre[:, 1], point[:, 0] - centre[:, 0])
     turned = np.mod((seen - first) * np.sign(sweep), 2 * np.pi)
     best = np.full(len(point), np.inf)
     for part in (np.clip(turned / np.abs(sweep), 0, 1), np.zeros(len(point)), np.ones(len(point))):
-        radius = np.linalg.norm(out, axis=1) * (1 - part) + np.linalg.norm(back, axis=1) * part
-        angle = first + part * sweep
-        place = centre + np.stack(
-            [radius * np.cos(angle), radius * np.sin(angle), np.zeros(len(point))], axis=1
-        )
-        place[:, 2] = start[:, 2] * (1 - part) + end[:, 2] * part
+        place = _on_arc(start, end, centre, sweep, part)
         best = np.minimum(best, np.linalg.norm(place - point, axis=1))
     return best
+
+
+def _on_arc(
+    start: np.ndarray, end: np.ndarray, centre: np.ndarray, sweep: np.ndarray, part: np.ndarray
+) -> np.ndarray:
+    """Places on helices, ``part`` (N,) of the way; the radius goes evenly from start to end."""
+    out, back = (start - centre)[:, :2], (end - centre)[:, :2]
+    radius = np.linalg.norm(out, axis=1) * (1 - part) + np.linalg.norm(back, axis=1) * part
+    angle = np.arctan2(out[:, 1], out[:, 0]) + part * sweep
+    height = start[:, 2] * (1 - part) + end[:, 2] * part
+    flat = centre[:, :2] + radius[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return np.column_stack([flat, height])
 
 
 @dataclass

@@ -139,14 +139,14 @@ def check_path(log: Log, drawing: Drawing, tolerance: float) -> list[str]:
 
 
 def check_covered(log: Log, drawing: Drawing, tolerance: float) -> list[str]:
-    """Both ends of every extruding move are reached, in order."""
+    """Every extruding move is drawn along its whole length, in order."""
     missed = []
     reach = max(200, int(0.5 / log.dt))
     for move in np.flatnonzero(drawing.extrudes):
         line = drawing.line[move]
         low = max(0, int(np.searchsorted(log.line, line, "left")) - reach)
         high = min(len(log.t), int(np.searchsorted(log.line, line, "right")) + reach)
-        for point in (drawing.start[move], drawing.end[move]):
+        for point in drawing.places(move):
             if polyline_distance(log.nozzle[low:high], point) > tolerance + ROUNDING_MM:
                 missed.append(line)
     return [f"{len(set(missed))} extruding moves not covered, first line {missed[0]}"] if missed else []

@@ -29,7 +29,7 @@ def list_(json_: Json = False) -> None:
     from cdhr_host.pipeline import open_profile
     from cdhr_host.profile import profile_names
 
-    rows = [(name, open_profile(name).machine, path) for name, path in profile_names().items()]
+    rows = [(name, open_profile(name).machine, path) for name, path in sorted(profile_names().items())]
     if json_:
         found = [{"name": n, "machine": m.name, "source": m.source, "path": str(p)} for n, m, p in rows]
         emit(json.dumps({"profiles": found}))

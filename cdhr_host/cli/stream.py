@@ -78,7 +78,7 @@ def _agreed(proof: "Proof", drives: str, yes: bool) -> None:
     asks = sys.stdin.isatty()
     if proof.pauses and not asks:
         raise Refusal(
-            f"cdhr: error: the program pauses for an operator ({proof.pauses} times), and there is no terminal"
+            f"cdhr: error: the program pauses {proof.pauses} times for an operator; there is no terminal"
             "\nhint: --yes passes the pauses"
         )
     if drives != SIMULATED and asks:

@@ -85,9 +85,12 @@ def from_keys(session: Session) -> int:
         while True:
             sys.stdout.write(f"\r\x1b[K{console.prompt}")
             sys.stdout.flush()
-            if not console.press(read_key(read)):
+            key = read_key(read)
+            if not console.press(key):
                 break
-            termios.tcflush(sys.stdin, termios.TCIFLUSH)
+            if key in AXES:
+                # A held key must not go on jogging after it is released.
+                termios.tcflush(sys.stdin, termios.TCIFLUSH)
     sys.stdout.write("\r\x1b[K")
     return 0
 
