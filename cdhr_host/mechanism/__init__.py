@@ -8,24 +8,61 @@ from cdhr_host.mechanism import trajectories
 from cdhr_host.mechanism.bounds import direction_change_bound
 from cdhr_host.mechanism.cables import Cables, Loads
 from cdhr_host.mechanism.consistency import inconsistencies
+from cdhr_host.mechanism.dynamics import (
+    AffineTensions,
+    accelerations,
+    affine_nine_tensions,
+    affine_tensions,
+    tension_slopes,
+    tension_stiffness,
+)
 from cdhr_host.mechanism.forward import forward, mistaken_error, model_errors, uncompensated_error
+from cdhr_host.mechanism.frequencies import elastic_frequencies, swinging_frequencies
 from cdhr_host.mechanism.kinematics import jacobian, lengths, reachable, slider, uncompensated_lengths
+from cdhr_host.mechanism.pairs import (
+    Pairs,
+    Shares,
+    bounded_shares,
+    condition,
+    moment_matrix,
+    nine_tensions,
+    shares,
+)
 from cdhr_host.mechanism.state import cable_state
 from cdhr_host.mechanism.statics import tensions
+from cdhr_host.mechanism.stretch import Give, stretch_doubt, stretched_forward
 
 __all__ = [
+    "AffineTensions",
     "Cables",
+    "Give",
     "Loads",
+    "Pairs",
+    "Shares",
+    "accelerations",
+    "affine_nine_tensions",
+    "affine_tensions",
+    "bounded_shares",
     "cable_state",
+    "condition",
     "direction_change_bound",
+    "elastic_frequencies",
     "forward",
     "inconsistencies",
     "jacobian",
     "lengths",
     "mistaken_error",
     "model_errors",
+    "moment_matrix",
+    "nine_tensions",
     "reachable",
+    "shares",
     "slider",
+    "stretch_doubt",
+    "stretched_forward",
+    "swinging_frequencies",
+    "tension_slopes",
+    "tension_stiffness",
     "tensions",
     "trajectories",
     "uncompensated_error",

@@ -67,6 +67,14 @@ def blocks(cables: Cables, lower: Array, upper: Array) -> Iterator[tuple[slice, 
         yield rows, wraps
 
 
+def platform_blocks(cables: Cables, which: Sequence[int], q: Array) -> Iterator[tuple[slice, list[Wrap]]]:
+    """Slices of the samples with the cables ``which`` of one platform; raises MotionError out of reach."""
+    for rows in block_rows(len(q)):
+        wraps = wraps_of(cables, which, components(q, rows))
+        _require_reach(wraps, rows.start, which[0])
+        yield rows, wraps
+
+
 def block_rows(count: int) -> Iterator[slice]:
     """Slices that cover ``count`` samples in turn."""
     return (slice(start, min(start + BLOCK, count)) for start in range(0, count, BLOCK))
@@ -88,9 +96,9 @@ def six_wraps(cables: Cables, lower: Vector, upper: Vector) -> list[Wrap]:
     return wraps_of(cables, LOWER, lower) + wraps_of(cables, UPPER, upper)
 
 
-def _require_reach(wraps: Sequence[Wrap], start: int) -> None:
-    """``start`` is the number of the first sample, for the error's words."""
-    for i, wrap in enumerate(wraps):
+def _require_reach(wraps: Sequence[Wrap], start: int, first: int = 0) -> None:
+    """``start`` is the number of the first sample, ``first`` of the first cable, for the error's words."""
+    for i, wrap in enumerate(wraps, first):
         reach = wrap.reach()
         if not reach.min() > 0.0:
             raise MotionError(_out_of_reach(i, reach, start))
