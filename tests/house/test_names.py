@@ -13,7 +13,6 @@ INNER = (
     "cdhr_host.extrusion",
     "cdhr_host.plant",
     "cdhr_host.values",
-    "cdhr_host.pipeline",
 )
 WORN = tuple(suffix for suffix in SUFFIXES if suffix not in {"_n", "_s", "_counts"})
 """Suffixes that are no plain word or index: ``_n`` and ``_s`` end too many honest names."""
