@@ -11,6 +11,7 @@ from cdhr_host.extrusion import air_command
 from cdhr_host.mechanism import Cables, Loads, cable_state, direction_change_bound, slider
 from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.planner import Planner
+from cdhr_host.motion.sampling import Timed, Timeline
 from cdhr_host.pipeline.audit import Audit, on_bed
 from cdhr_host.profile import Profile
 from cdhr_host.program import Interpreter, Modal
@@ -39,7 +40,8 @@ class Staircase:
         self._period = profile.drives.period if rate_hz is None else 1.0 / rate_hz
         self._limits = MotionLimits.from_profile(profile, direction_change_bound(profile))
         self._audit = Audit(profile)
-        self._planner = Planner(self._limits, self._period, self._cables.reference_G)
+        self._timeline = Timeline(self._period)
+        self._planner = Planner(self._limits, self._cables.reference_G)
         self._interpreter = Interpreter(profile, at_G=self._cables.reference_G)
 
     @property
@@ -55,23 +57,34 @@ class Staircase:
     def stand_at(self, at_G: Array) -> None:
         """The machine was stopped on its way and stands at (3,) m; modal state stays otherwise."""
         x, y, z = at_G.tolist()
-        self._planner = Planner(self._limits, self._period, at_G)
+        self._planner, self._timeline = Planner(self._limits, at_G), Timeline(self._period)
         self._interpreter.modal = replace(self._interpreter.modal, position=(x, y, z))
 
-    def walk(self, chunks: Iterable[bytes]) -> Iterator[Command | Checked]:
-        """Each command of a text, followed by the setpoints it settles; ends at rest.
+    def timed(self, chunks: Iterable[bytes]) -> Iterator[Command | Timed]:
+        """Each command of a text, after the stretches it settles; ends at rest.
 
         Before a Pause comes everything up to rest. Raises ProgramError, after the last line,
         for text that is not understood.
         """
         self._audit = Audit(self.profile)
         for command in self._interpreter.commands(chunks):
-            for track in self._planner.tracks(command):
-                yield self._checked(track)
+            for stretch in self._planner.stretches(command):
+                yield self._timeline.lay(stretch)
             if isinstance(command, Pause):
-                yield from self._rest()
+                yield self._timeline.rest(self._planner.standing)
             yield command
-        yield from self._rest()
+        for stretch in self._planner.close():
+            yield self._timeline.lay(stretch)
+        yield self._timeline.rest(self._planner.standing)
+
+    def walk(self, chunks: Iterable[bytes]) -> Iterator[Command | Checked]:
+        """As ``timed``, with every setpoint of each stretch in its place."""
+        for step in self.timed(chunks):
+            if isinstance(step, Timed):
+                for track in step.tracks():
+                    yield self.checked(track)
+            else:
+                yield step
 
     def setpoints(self, chunks: Iterable[bytes]) -> Iterator[Setpoints]:
         """Setpoints only; raises MotionError at the first the machine cannot do."""
@@ -83,18 +96,15 @@ class Staircase:
 
     def prepare(self, chunks: Iterable[bytes]) -> list[Setpoints]:
         """All setpoints of a short text, or a refusal that leaves the machine as it was."""
-        planner, modal = copy.deepcopy(self._planner), self._interpreter.modal
+        before = copy.deepcopy((self._planner, self._timeline)), self._interpreter.modal
         try:
             return list(self.setpoints(chunks))
         except BaseException:
-            self._planner, self._interpreter.modal = planner, modal
+            (self._planner, self._timeline), self._interpreter.modal = before
             raise
 
-    def _rest(self) -> Iterator[Checked]:
-        for track in self._planner.finish():
-            yield self._checked(track)
-
-    def _checked(self, track: ToolTrack) -> Checked:
+    def checked(self, track: ToolTrack) -> Checked:
+        """Samples of the nozzle -> setpoints of the machine, audited."""
         inside = on_bed(track.position_G, self.profile)
         problems = self._audit.places(track)
         if not inside.all():

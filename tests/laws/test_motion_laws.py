@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.planner import Planner, all_tracks
+from cdhr_host.motion.sampling import Timeline
 from cdhr_host.values import Dwell, Moves
 
 PERIOD = 0.004
@@ -37,7 +38,7 @@ def program(rows, dwells):
 @given(st.lists(ROW, min_size=1, max_size=30), st.sets(st.integers(1, 30), max_size=3))
 def test_limits_hold_and_the_end_is_reached(rows, dwells):
     commands = list(program(rows, dwells))
-    tracks = list(all_tracks(Planner(LIMITS, PERIOD, np.zeros(3)), commands))
+    tracks = list(all_tracks(Planner(LIMITS, np.zeros(3)), Timeline(PERIOD), commands))
     position = np.concatenate([track.position_G for track in tracks])
     line = np.concatenate([track.line for track in tracks])
     velocity, acceleration, jerk = (
@@ -61,7 +62,7 @@ def test_clay_is_laid_in_proportion_to_the_way_travelled(rows):
     density = 12.5e-6
     drawn = [(step, speed, density * math.hypot(*step)) for step, speed, _ in rows]
     period = PERIOD / 8
-    tracks = list(all_tracks(Planner(LIMITS, period, np.zeros(3)), program(drawn, set())))
+    tracks = list(all_tracks(Planner(LIMITS, np.zeros(3)), Timeline(period), program(drawn, set())))
     laid = sum(float(track.flow.sum()) for track in tracks) * period
     position = np.concatenate([track.position_G for track in tracks])
     way = float(np.linalg.norm(np.diff(position, axis=0), axis=1).sum())

@@ -9,6 +9,7 @@ import pytest
 
 from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.planner import Planner, all_tracks
+from cdhr_host.motion.sampling import Timeline
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -27,7 +28,7 @@ def run(limits):
     """Commands -> one track; starts where the first command does."""
 
     def run(commands, *, start=None, period=PERIOD):
-        planner = Planner(limits, period, np.zeros(3) if start is None else np.asarray(start, float))
-        return joined(list(all_tracks(planner, commands)))
+        planner = Planner(limits, np.zeros(3) if start is None else np.asarray(start, float))
+        return joined(list(all_tracks(planner, Timeline(period), commands)))
 
     return run

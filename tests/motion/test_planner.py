@@ -9,6 +9,7 @@ from motion_tracks import PERIOD, differences, distance_to, joined, moves, norm
 
 from cdhr_host.motion.leg import BATCH
 from cdhr_host.motion.planner import Planner, all_tracks
+from cdhr_host.motion.sampling import Timeline
 from cdhr_host.values import Arc, Dwell, Moves, Notice, Pause, Prime, Stop
 
 SQUARE = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0], [0, 0, 0]])
@@ -168,9 +169,9 @@ def test_corner_sharper_than_the_stop_angle_is_reached_exactly(run):
 
 
 def test_ticks_go_on_from_program_to_program(limits):
-    planner = Planner(limits, PERIOD, np.zeros(3))
-    first = joined(list(all_tracks(planner, [moves([[0, 0, 0], [0.01, 0, 0]])])))
-    second = joined(list(all_tracks(planner, [moves([[0.01, 0, 0], [0, 0, 0]])])))
+    planner, timeline = Planner(limits, np.zeros(3)), Timeline(PERIOD)
+    first = joined(list(all_tracks(planner, timeline, [moves([[0, 0, 0], [0.01, 0, 0]])])))
+    second = joined(list(all_tracks(planner, timeline, [moves([[0.01, 0, 0], [0, 0, 0]])])))
     assert second.tick[0] == first.tick[-1] + 1
     assert np.allclose(second.position_G[-1], 0, atol=1e-12)
 
@@ -183,15 +184,15 @@ def test_empty_program_is_one_tick_at_rest(run):
 
 def test_only_commands_are_planned(limits):
     with pytest.raises(TypeError, match="no motion"):
-        list(Planner(limits, PERIOD, np.zeros(3)).tracks("G1 X1"))
+        list(Planner(limits, np.zeros(3)).stretches("G1 X1"))
 
 
 def test_memory_of_a_long_leg_stays_bounded(limits):
-    planner = Planner(limits, PERIOD, np.zeros(3))
+    planner = Planner(limits, np.zeros(3))
     points = np.column_stack((np.arange(BATCH + 1) * 1e-4, np.zeros((BATCH + 1, 2))))
     held = []
     for k in range(6):
-        list(planner.tracks(moves(points + np.array([k * points[-1, 0], 0, 0]), 0.02)))
+        list(planner.stretches(moves(points + np.array([k * points[-1, 0], 0, 0]), 0.02)))
         held.append(len(planner._leg._segments))
     assert max(held[2:]) <= 2 * BATCH
 
