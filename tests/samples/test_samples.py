@@ -20,7 +20,7 @@ NUMBER = re.compile(r"([XYZEFIJ])([-+\d.]+)")
 
 
 def words(line: str) -> dict[str, float]:
-    return {letter: float(number) for letter, number in NUMBER.findall(line.split(";")[0])}
+    return {letter: float(number) for letter, number in NUMBER.findall(line.partition(";")[0])}
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.stem)
