@@ -46,6 +46,11 @@ class Servo:
         self._determinant = math.exp(-2.0 * drives.servo_damping * w * drives.period)
         self._poles = np.array([1.0, -float(np.trace(self._phi)), self._determinant])
 
+    @property
+    def recurrence(self) -> tuple[float, float, float]:
+        """tr(phi), det(phi) and phi[0, 1]: of the error e[k] on e[k-1], e[k-2] and the kick."""
+        return float(np.trace(self._phi)), self._determinant, float(self._phi[0, 1])
+
     def standing(self, setpoint: Array, slider: Array) -> ServoState:
         """(6,), (6,) -> the loops with the sliders at rest at ``slider`` and told ``setpoint``."""
         error = slider - setpoint
