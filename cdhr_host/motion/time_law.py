@@ -18,6 +18,8 @@ class TimeLaw:
     """(K,) s, start of each piece; the first is 0"""
     duration: float
     """s"""
+    end: float
+    """m, s at the end"""
     state: Array
     """(4, K) s (m), s' (m/s), s'' (m/s²) at the start, s''' (m/s³)"""
 
@@ -46,7 +48,8 @@ def time_law(cells: Cells, borders: Array) -> TimeLaw:
     duration[:, 3] = np.maximum(cells.length - rise - fall, 0.0) / peaks
     _change(duration[:, :3], jerk[:, :3], borders[:-1], peaks, cells)
     _change(duration[:, 4:], jerk[:, 4:], peaks, borders[1:], cells)
-    return _integrated(cells.start, borders[:-1], duration, jerk)
+    end = float(cells.start[-1] + cells.length[-1])
+    return _integrated(cells.start, borders[:-1], end, duration, jerk)
 
 
 def _change(duration: Array, jerk: Array, v0: Array, v1: Array, cells: Cells) -> None:
@@ -56,8 +59,8 @@ def _change(duration: Array, jerk: Array, v0: Array, v1: Array, cells: Cells) ->
         duration[k], jerk[k] = t[:3], j[:3]
 
 
-def _integrated(s: Array, v: Array, duration: Array, jerk: Array) -> TimeLaw:
-    """Pieces (K, 7) of each cell, from its start s and speed v (K,), as one law."""
+def _integrated(s: Array, v: Array, last: float, duration: Array, jerk: Array) -> TimeLaw:
+    """Pieces (K, 7) of each cell, from its start s and speed v (K,), as one law ending at s = last."""
     state = np.zeros((4, *duration.shape))
     state[0, :, 0], state[1, :, 0], state[3] = s, v, jerk
     for i in range(6):
@@ -68,4 +71,4 @@ def _integrated(s: Array, v: Array, duration: Array, jerk: Array) -> TimeLaw:
     end = np.cumsum(duration)
     lasting = duration.ravel() > 0
     start = np.concatenate(([0.0], end[:-1]))[lasting]
-    return TimeLaw(start, float(end[-1]), state.reshape(4, -1)[:, lasting])
+    return TimeLaw(start, float(end[-1]), last, state.reshape(4, -1)[:, lasting])

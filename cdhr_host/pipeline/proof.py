@@ -8,8 +8,10 @@ from functools import singledispatchmethod
 import numpy as np
 
 from cdhr_host.errors import MAX_LISTED, Problem
+from cdhr_host.motion.sampling import Timed
 from cdhr_host.pipeline.columns import setpoint_columns
 from cdhr_host.pipeline.staircase import Checked, Staircase
+from cdhr_host.pipeline.survey import Survey
 from cdhr_host.profile import Profile
 from cdhr_host.values import Arc, Command, Dwell, Moves, Notice, Pause, Prime, Setpoints, Stop
 
@@ -51,22 +53,29 @@ def prove(
     *,
     rate_hz: float | None = None,
     sink: Callable[[Setpoints], None] | None = None,
+    watch: Callable[[Setpoints], None] | None = None,
 ) -> Proof:
     """Walk a program's text once, in memory that does not grow with it.
 
-    ``sink`` gets every block of setpoints as long as there is no problem. Raises
+    ``sink`` gets every setpoint, in blocks, as long as there is no problem. Without it only
+    the setpoints are computed that prove the others (see ``survey``); the extremes are then
+    theirs. ``watch`` gets the blocks that are computed, to show progress. Raises
     ProgramError for text that is not understood; what the machine cannot do is listed in
     the proof instead.
     """
     staircase = Staircase(profile, rate_hz=rate_hz)
+    chosen = Survey(profile).tracks if sink is None else Timed.tracks
     tally = _Tally()
-    for step in staircase.walk(chunks):
-        if isinstance(step, Checked):
-            tally.block(step)
-            if sink is not None and not tally.total:
-                sink(step.setpoints)
-        else:
+    for step in staircase.timed(chunks):
+        if not isinstance(step, Timed):
             tally.command(step)
+            continue
+        for checked in map(staircase.checked, chosen(step)):
+            tally.block(checked)
+            if sink is not None and not tally.total:
+                sink(checked.setpoints)
+            if watch is not None:
+                watch(checked.setpoints)
     return tally.proof(staircase.lines)
 
 

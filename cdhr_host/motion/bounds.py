@@ -1,0 +1,69 @@
+"""What a leg never exceeds, at any instant: bounds in continuous time, not samples.
+
+On each piece of the time law s', s'' and s''' are bounded by their values at its ends, and
+on the path pieces it runs over |q''| and |q'''| are; |q'| <= 1. So at every instant
+
+    |v| <= s',   |a| <= |q''| s'² + |s''|,   |j| <= |q'''| s'³ + 3 |q''| s' |s''| + |s'''|.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdhr_host.motion.leg import Leg
+from cdhr_host.values import Array, Ints
+
+
+@dataclass(frozen=True, slots=True)
+class LegBounds:
+    """Greatest values over a whole leg."""
+
+    speed: float
+    """m/s"""
+    over_feed: float
+    """greatest ratio of the speed to the programmed one"""
+    acceleration: float
+    """m/s²"""
+    jerk: float
+    """m/s³"""
+    flow: float
+    """m³/s"""
+    air: float
+    """Pa held by air words"""
+
+
+def leg_bounds(leg: Leg) -> LegBounds:
+    """Bounds of a leg, from its time law and path alone."""
+    start, speed, change, jerk = leg.law.state
+    after = np.diff(leg.law.t, append=leg.law.duration)
+    fastest = np.maximum(speed, speed + after * (change + after * jerk / 2))
+    harshest = np.maximum(np.abs(change), np.abs(change + after * jerk))
+    rows = _overlapped(leg.path.start, start, np.append(start[1:], leg.law.end))
+    bend, bend_change = (_largest(bound, rows) for bound in leg.path.bounds())
+    segment = leg.path.segment
+    feed = -_largest(-leg.segments.feed[segment], rows)
+    flow = _largest(leg.segments.clay[segment], rows) * fastest
+    acceleration = bend * fastest**2 + harshest
+    jerks = bend_change * fastest**3 + 3 * bend * fastest * harshest + np.abs(jerk)
+    return LegBounds(
+        float(fastest.max()),
+        float((fastest / feed).max()),
+        float(acceleration.max()),
+        float(jerks.max()),
+        float(flow.max()),
+        float(leg.segments.air.max()),
+    )
+
+
+def _overlapped(pieces: Array, start: Array, end: Array) -> Ints:
+    """(2 K,) first path piece of each stretch of s, and the one after its last, in turn."""
+    first = np.maximum(np.searchsorted(pieces, start, side="right") - 1, 0)
+    last = np.maximum(np.searchsorted(pieces, end, side="left"), first + 1)
+    return np.column_stack((first, last)).ravel()
+
+
+def _largest(values: Array, rows: Ints) -> Array:
+    """Greatest value over each pair of rows."""
+    padded = np.append(values, -np.inf)
+    found: Array = np.maximum.reduceat(padded, rows)[::2]
+    return found
