@@ -5,190 +5,24 @@ Each field is declared once, as ``name: Annotated[float, key("name_unit", text, 
 marker after it turns the validated number into SI.
 """
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from cdhr_host.units import DEG, KPA, MM, MM3, MS, N_MM
-
-
-def key(name: str, text: str, **bounds: Any) -> Any:
-    """The file's key for a field, with its description and its bounds in the file's unit."""
-    return Field(alias=name, description=text, **bounds)
-
-
-def _to_si(factor: float) -> AfterValidator:
-    return AfterValidator(lambda value: value * factor)
-
-
-IN_MM = _to_si(MM)
-IN_MM3 = _to_si(MM3)
-IN_N_MM = _to_si(N_MM)
-IN_DEG = _to_si(DEG)
-IN_KPA = _to_si(KPA)
-IN_MS = _to_si(MS)
-IN_KPA_S_MM3 = _to_si(KPA / MM3)
+from cdhr_host.profile.body import Forces, Geometry, Machine, Platforms, Sliders, Spring, Stretch
+from cdhr_host.profile.fields import (
+    IN_DEG,
+    IN_KPA,
+    IN_KPA_S_MM3,
+    IN_MM,
+    IN_MS,
+    Section,
+    key,
+    to_si,
+)
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-
-
-class Machine(_Section):
-    """[machine]: what this profile describes."""
-
-    name: Annotated[str, Field(description="short name of the machine", min_length=1, max_length=80)]
-    source: Annotated[str, Field(description="where the numbers come from", max_length=400)] = ""
-
-
-class Geometry(_Section):
-    """[geometry]: pulleys and platforms, Table A1."""
-
-    pulley_circle_radius: Annotated[
-        float,
-        key("pulley_circle_radius_mm", "radius of the circle the pulley centres stand on", gt=0, le=1e5),
-        IN_MM,
-    ]
-    pulley_radius: Annotated[
-        float, key("pulley_radius_mm", "groove radius of the pulleys", ge=0, le=500), IN_MM
-    ]
-    lower_pulley_height: Annotated[
-        float,
-        key("lower_pulley_height_mm", "height of the lower pulley centres in W", ge=-1e5, le=1e5),
-        IN_MM,
-    ]
-    upper_pulley_height: Annotated[
-        float,
-        key("upper_pulley_height_mm", "height of the upper pulley centres in W", ge=-1e5, le=1e5),
-        IN_MM,
-    ]
-    lower_attachment_radius: Annotated[
-        float,
-        key(
-            "lower_attachment_radius_mm", "radius of the pair mid-points on the lower platform", ge=0, le=1e4
-        ),
-        IN_MM,
-    ]
-    upper_attachment_radius: Annotated[
-        float,
-        key(
-            "upper_attachment_radius_mm",
-            "radius of the attachment points on the upper platform",
-            ge=0,
-            le=1e4,
-        ),
-        IN_MM,
-    ]
-    reference_height: Annotated[
-        float,
-        key(
-            "reference_height_mm",
-            "height of the lower attachment plane in W at the reference pose",
-            ge=-1e5,
-            le=1e5,
-        ),
-        IN_MM,
-    ]
-    reference_separation: Annotated[
-        float,
-        key(
-            "reference_separation_mm",
-            "upper attachment plane above the lower one at the reference pose",
-            gt=0,
-            le=1e4,
-        ),
-        IN_MM,
-    ]
-    pair_spacing: Annotated[
-        float, key("pair_spacing_mm", "distance between the two cables of a lower pair", gt=0, le=1e4), IN_MM
-    ] = 110.0 * MM
-    nozzle_length: Annotated[
-        float, key("nozzle_length_mm", "lower attachment plane above the nozzle's tip", gt=0, le=1e4), IN_MM
-    ] = 200.0 * MM
-    pulley_model: Annotated[
-        Literal["swivel", "fixed-plane", "caster", "point"],
-        Field(
-            description="how the pulleys are hung: about the vertical, not at all, about the cable, or none"
-        ),
-    ] = "swivel"
-
-
-class Spring(_Section):
-    """[spring]: between the two platforms, Eq. (11) with the rest length the paper leaves out."""
-
-    stiffness: Annotated[float, key("stiffness_n_mm", "stiffness", gt=0, le=1e4), IN_N_MM]
-    rest_length: Annotated[float, key("rest_length_mm", "length without force", ge=0, le=1e4), IN_MM]
-    policy: Annotated[
-        Literal["fixed", "preload", "vertical", "free"],
-        Field(
-            description="where the upper platform stands: constant offset, constant force, best height, best place"
-        ),
-    ] = "fixed"
-    preload: Annotated[
-        float, key("preload_n", "spring force that the policy preload holds", gt=0, le=1e5)
-    ] = 30.0
-
-
-class Platforms(_Section):
-    """[platforms]: what hangs on the cables."""
-
-    lower_mass: Annotated[
-        float, key("lower_mass_kg", "mass of the lower platform with nozzle and clay", gt=0, le=1e3)
-    ]
-    upper_mass: Annotated[float, key("upper_mass_kg", "mass of the upper platform", gt=0, le=1e3)]
-
-
-class Forces(_Section):
-    """[forces]: the window each equivalent cable's force must stay in."""
-
-    lower_min: Annotated[float, key("lower_min_n", "least force of cables 1-3", ge=0, le=1e5)]
-    lower_max: Annotated[float, key("lower_max_n", "greatest force of cables 1-3", gt=0, le=1e5)]
-    upper_min: Annotated[float, key("upper_min_n", "least force of cables 4-6", ge=0, le=1e5)]
-    upper_max: Annotated[float, key("upper_max_n", "greatest force of cables 4-6", gt=0, le=1e5)]
-    single_min: Annotated[
-        float, key("single_min_n", "least force of one cable of a lower pair", ge=0, le=1e5)
-    ] = 0.0
-    single_max: Annotated[
-        float, key("single_max_n", "greatest force of one cable of a lower pair", gt=0, le=1e5)
-    ] = 1e5
-
-
-class Stretch(_Section):
-    """[stretch]: cables that give under load."""
-
-    compensation: Annotated[
-        Literal["off", "on"], Field(description="whether setpoints allow for the cables' stretch")
-    ] = "off"
-    stiffness: Annotated[
-        float, key("stiffness_n", "EA of one cable: force for doubling its length", gt=0, le=1e9)
-    ] = 30e3
-    stiffness_doubt: Annotated[
-        float, key("stiffness_doubt_percent", "how far EA may be off", ge=0, lt=100), _to_si(0.01)
-    ] = 0.2
-    lower_dead_length: Annotated[
-        float, key("lower_dead_length_mm", "cable between pulley and slider, cables 1-3", ge=0, le=1e5), IN_MM
-    ] = 1.0
-    upper_dead_length: Annotated[
-        float, key("upper_dead_length_mm", "cable between pulley and slider, cables 4-6", ge=0, le=1e5), IN_MM
-    ] = 1.0
-
-
-class Sliders(_Section):
-    """[sliders]: six ball screws; travel counts from the reference pose, positive paid out."""
-
-    screw_lead: Annotated[
-        float, key("screw_lead_mm", "travel of a slider in one motor turn", gt=0, le=1e3), IN_MM
-    ]
-    travel_min: Annotated[float, key("travel_min_mm", "end of travel winding in", ge=-1e5, le=0), IN_MM]
-    travel_max: Annotated[float, key("travel_max_mm", "end of travel paying out", ge=0, le=1e5), IN_MM]
-    speed_max: Annotated[float, key("speed_max_mm_s", "greatest slider speed", gt=0, le=1e5), IN_MM]
-    acceleration_max: Annotated[
-        float, key("acceleration_max_mm_s2", "greatest slider acceleration", gt=0, le=1e7), IN_MM
-    ]
-    jerk_max: Annotated[float, key("jerk_max_mm_s3", "greatest slider jerk", gt=0, le=1e9), IN_MM]
-
-
-class Limits(_Section):
+class Limits(Section):
     """[limits]: of the nozzle."""
 
     speed_max: Annotated[
@@ -200,7 +34,7 @@ class Limits(_Section):
     jerk_max: Annotated[float, key("jerk_max_mm_s3", "greatest nozzle jerk", gt=0, le=1e9), IN_MM]
 
 
-class PathRules(_Section):
+class PathRules(Section):
     """[path]: how exactly the nozzle follows the drawn path."""
 
     tolerance: Annotated[
@@ -211,7 +45,7 @@ class PathRules(_Section):
     ]
 
 
-class Bed(_Section):
+class Bed(Section):
     """[bed]: where programs live in W, and the volume they may use."""
 
     origin_x: Annotated[
@@ -254,7 +88,7 @@ class Bed(_Section):
     ]
 
 
-class Extruder(_Section):
+class Extruder(Section):
     """[extruder]: E to clay, clay to air."""
 
     nozzle_diameter: Annotated[float, key("nozzle_diameter_mm", "bore of the nozzle", gt=0, le=100), IN_MM]
@@ -279,7 +113,7 @@ class Extruder(_Section):
     ]
 
 
-class Air(_Section):
+class Air(Section):
     """[air]: which words open and close the air besides E; each is ``ignore`` or ``air``."""
 
     fan_words: Annotated[Literal["ignore", "air"], Field(description="M106 S0-255 / M107")]
@@ -290,7 +124,7 @@ class Air(_Section):
     pin: Annotated[int, Field(description="pin number that is the air when pin_words is air", ge=0, le=1000)]
 
 
-class Drives(_Section):
+class Drives(Section):
     """[drives]: six servo axes and the pressure regulator."""
 
     period: Annotated[float, key("period_ms", "time between two setpoints", ge=0.25, le=50), IN_MS]
@@ -307,7 +141,7 @@ class Drives(_Section):
         IN_MM,
     ]
     screw_efficiency: Annotated[
-        float, key("screw_efficiency_percent", "efficiency of the ball screws", gt=0, le=100), _to_si(0.01)
+        float, key("screw_efficiency_percent", "efficiency of the ball screws", gt=0, le=100), to_si(0.01)
     ]
     torque_max: Annotated[float, key("torque_max_nm", "greatest motor torque", gt=0, le=1e3)]
     regulator_lag: Annotated[
@@ -315,7 +149,7 @@ class Drives(_Section):
     ]
 
 
-class CanOpen(_Section):
+class CanOpen(Section):
     """[canopen]: six CiA 402 drives on nodes 1-6 and one CiA 401 coupler on node 7."""
 
     mode: Annotated[Literal["csp", "ip"], Field(description="cyclic position mode: 8 (csp) or 7 (ip)")]
@@ -355,7 +189,7 @@ class CanOpen(_Section):
     homing_method: Annotated[int, Field(description="0x6098 of homing", ge=-128, le=127)]
     homing_speed: Annotated[float, key("homing_speed_mm_s", "speed of homing, 0x6099", gt=0, le=1e3), IN_MM]
     homing_torque: Annotated[
-        float, key("homing_torque_percent", "torque limit while homing", gt=0, le=300), _to_si(0.01)
+        float, key("homing_torque_percent", "torque limit while homing", gt=0, le=300), to_si(0.01)
     ]
     link_loss_tested: Annotated[
         bool, Field(description="bench test passed: drives without 0x6007 stop when the host falls silent")
@@ -384,7 +218,7 @@ class CanOpen(_Section):
     ]
 
 
-class Link(_Section):
+class Link(Section):
     """[link]: the framed serial link to a motion bridge."""
 
     watchdog: Annotated[
@@ -396,7 +230,7 @@ class Link(_Section):
     ]
 
 
-class Profile(_Section):
+class Profile(Section):
     """One machine, frozen, in SI."""
 
     machine: Machine
