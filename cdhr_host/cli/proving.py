@@ -27,15 +27,14 @@ def proven(
     with writing(log) if log else nullcontext(), SetpointLog(log) if log else nullcontext() as out:
         with Progress("checking") as progress:
 
-            def sink(block: "Setpoints") -> None:
+            def watch(block: "Setpoints") -> None:
                 if len(block):
                     progress.show(
                         source.fraction, f"line {block.line[-1]}  {clock_text(block.t[-1])} of motion"
                     )
-                if out is not None:
-                    out.add_setpoints(block)
 
-            proof = prove(source.chunks(), machine, rate_hz=rate, sink=sink)
+            sink = out.add_setpoints if out is not None else None
+            proof = prove(source.chunks(), machine, rate_hz=rate, sink=sink, watch=watch)
         if out is not None and proof.ok:
             out.keep()
     return proof

@@ -89,8 +89,7 @@ class Survey:
         travel, sliders = slider(self._cables, lengths(self._cables, q, q)), self._profile.sliders
         pulled = (low >= self._least) & (high <= self._greatest)
         held = (travel >= sliders.travel_min + SPACING) & (travel <= sliders.travel_max - SPACING)
-        certain: Flags = (pulled & held).all(axis=1)
-        return certain
+        return np.asarray((pulled & held).all(axis=1), dtype=np.bool_)
 
 
 def _row_norms(gain: Array) -> Array:
