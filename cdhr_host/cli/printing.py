@@ -125,7 +125,7 @@ def _kept(log: Path) -> "Iterator[RunLog]":
     """A run log that is kept however the run ends: it is the machine's black box."""
     from cdhr_host.report.log import RunLog
 
-    with writing(log), RunLog(log) as out:
+    with writing(log, "; the machine stopped on its path, air off"), RunLog(log) as out:
         try:
             yield out
         finally:

@@ -52,12 +52,12 @@ def about(source: str) -> Iterator[None]:
 
 
 @contextmanager
-def writing(path: Path) -> Iterator[None]:
+def writing(path: Path, consequence: str = "") -> Iterator[None]:
     """A disk that refuses while this file is written is the user's to mend, not a bug."""
     try:
         yield
     except OSError as error:
-        raise Refusal(f"cdhr: error: cannot write {path}: {error.strerror}") from error
+        raise Refusal(f"cdhr: error: cannot write {path}: {error.strerror}{consequence}") from error
 
 
 def say(text: str) -> None:
