@@ -94,12 +94,12 @@ class Bodies:
         self._gap = strands.upper[2] - strands.lower[2]
         rest = _at_reference(strands)
         dead = (profile.stretch.lower_dead_length,) * 6 + (profile.stretch.upper_dead_length,) * 3
-        self._stiffness = tuple(
+        self.stiffness = tuple(
             profile.stretch.stiffness / (span + more) for span, more in zip(rest, dead, strict=True)
         )
         force = _reference_forces(profile, self._loads)
         self._natural = tuple(
-            span - pull / k for span, pull, k in zip(rest, force, self._stiffness, strict=True)
+            span - pull / k for span, pull, k in zip(rest, force, self.stiffness, strict=True)
         )
 
     def wound(self, slider: Sequence[float], rate: Sequence[float]) -> Wound:
@@ -136,7 +136,7 @@ class Bodies:
         lifted = self._loads.lower_mass * state.lower[2] + self._loads.upper_mass * state.upper[2]
         stretch = sqrt(sum(part * part for part in self._span(state, axis))) - self._loads.rest_length
         pulled = self.tensions(state, command)
-        cables = sum(pull * pull / k for pull, k in zip(pulled, self._stiffness, strict=True))
+        cables = sum(pull * pull / k for pull, k in zip(pulled, self.stiffness, strict=True))
         return 0.5 * (turning + moving + self._loads.stiffness * stretch**2 + cables) + GRAVITY * lifted
 
     def _law(self, command: Forces | Wound) -> Tension:
@@ -152,7 +152,7 @@ class Bodies:
         return forced
 
     def _stretched(self, command: Wound, kept: float, creep: float) -> Tension:
-        stiffness, damping = self._stiffness, self.build.damping
+        stiffness, damping = self.stiffness, self.build.damping
         length_of, rate_of = command.length, command.rate
 
         def stretched(i: int, length: float, rate: float) -> float:
