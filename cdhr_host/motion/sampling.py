@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdhr_host.motion.leg import Leg
+from cdhr_host.motion.shaping import UNSHAPED, Shaper
 from cdhr_host.values import Array, Ints, ToolTrack
 
 BLOCK = 4096
@@ -32,15 +33,41 @@ Stretch = Leg | Stand
 
 
 @dataclass(frozen=True, slots=True)
-class Timed:
-    """A stretch on the time axis, with the ticks that fall on it."""
+class Laid:
+    """A stretch on the time axis."""
 
     stretch: Stretch
     begin: float
     """s since the program's start"""
+
+    def track(self, tick: Ints, t: Array) -> ToolTrack:
+        """(N,) ticks, and the times (N,) s at which this stretch is asked for them."""
+        if isinstance(self.stretch, Stand):
+            return _standing(self.stretch, tick)
+        return _moving(self.stretch, tick, np.clip(t - self.begin, 0.0, self.stretch.duration))
+
+
+@dataclass(frozen=True, slots=True)
+class Timed:
+    """A stretch with the ticks that fall on it, and what the shaper still sees of earlier ones."""
+
+    laid: tuple[Laid, ...]
+    """in order; the last is the stretch itself"""
     ticks: range
     period: float
     """s"""
+    shaper: Shaper
+
+    @property
+    def stretch(self) -> Stretch:
+        """The stretch itself."""
+        return self.laid[-1].stretch
+
+    @property
+    def settling(self) -> range:
+        """Ticks at which the shaper still looks back to earlier stretches."""
+        end = math.ceil((self.laid[-1].begin + self.shaper.length) / self.period)
+        return range(self.ticks.start, min(max(end, self.ticks.start), self.ticks.stop))
 
     def tracks(self) -> Iterator[ToolTrack]:
         """Every tick, in blocks."""
@@ -48,34 +75,57 @@ class Timed:
             yield self.track(np.arange(first, min(first + BLOCK, self.ticks.stop)))
 
     def track(self, tick: Ints) -> ToolTrack:
-        """(N,) ticks of this stretch -> the nozzle at them."""
-        if isinstance(self.stretch, Stand):
-            return _standing(self.stretch, tick)
-        t = np.clip(tick * self.period - self.begin, 0.0, self.stretch.duration)
-        return _moving(self.stretch, tick, t)
+        """(N,) ascending ticks of this stretch -> the nozzle at them."""
+        copies = [self._copy(tick, tick * self.period - delay) for delay in self.shaper.delay]
+        return copies[0] if len(copies) == 1 else _mean(copies, self.shaper)
+
+    def _copy(self, tick: Ints, t: Array) -> ToolTrack:
+        """The unshaped nozzle at times t (N,) s, ascending, perhaps reaching back."""
+        begins = [each.begin for each in self.laid[1:]]
+        cuts = [0, *np.searchsorted(t, begins).tolist(), len(t)]
+        parts = [
+            each.track(tick[cuts[k] : cuts[k + 1]], t[cuts[k] : cuts[k + 1]])
+            for k, each in enumerate(self.laid)
+            if cuts[k + 1] > cuts[k]
+        ]
+        return parts[0] if len(parts) == 1 else ToolTrack.joined(parts)
 
 
 class Timeline:
     """Lays stretches one after the other, on ticks of one period."""
 
-    def __init__(self, period: float) -> None:
+    def __init__(self, period: float, shaper: Shaper = UNSHAPED) -> None:
         self.period = period
+        self._shaper = shaper
+        self._laid: tuple[Laid, ...] = ()
         self._time = 0.0
         self._tick = 0
 
     def lay(self, stretch: Stretch) -> Timed:
         """The next stretch, from where the last one ended."""
-        begin, self._time = self._time, self._time + stretch.duration
-        end = max(math.ceil(self._time / self.period - EARLY), self._tick)
-        ticks, self._tick = range(self._tick, end), end
-        return Timed(stretch, begin, ticks, self.period)
+        laid = self._add(stretch)
+        self._time += stretch.duration
+        return self._timed(laid, max(math.ceil(self._time / self.period - EARLY), self._tick))
 
     def rest(self, stand: Stand) -> Timed:
-        """Stand until the first tick at which nothing moves has passed; the next stretch begins there."""
-        last = max(math.ceil(self._time / self.period - EARLY), self._tick)
-        timed = Timed(stand, self._time, range(self._tick, last + 1), self.period)
-        self._tick, self._time = last + 1, last * self.period
-        return timed
+        """Stand until the first tick at which nothing moves any more; the next stretch begins there."""
+        laid = self._add(stand)
+        still = self._time + self._shaper.length
+        last = max(math.ceil(still / self.period - EARLY), self._tick)
+        self._time = last * self.period
+        return self._timed(laid, last + 1)
+
+    def _add(self, stretch: Stretch) -> tuple[Laid, ...]:
+        """The stretch behind those that the shaper still sees from its begin on."""
+        seen = self._time - self._shaper.length
+        ends = [*(each.begin for each in self._laid[1:]), self._time]
+        kept = [each for each, end in zip(self._laid, ends, strict=False) if end > seen]
+        self._laid = (*kept, Laid(stretch, self._time))
+        return self._laid
+
+    def _timed(self, laid: tuple[Laid, ...], end: int) -> Timed:
+        ticks, self._tick = range(self._tick, end), end
+        return Timed(laid, ticks, self.period, self._shaper)
 
 
 def _standing(stand: Stand, tick: Ints) -> ToolTrack:
@@ -96,3 +146,13 @@ def _moving(leg: Leg, tick: Ints, t: Array) -> ToolTrack:
     air = np.where(speed > 0.0, carried.air[segment], 0.0)
     flow = carried.clay[segment] * speed
     return ToolTrack(tick, carried.line[segment], position, velocity, acceleration, flow, air)
+
+
+def _mean(copies: list[ToolTrack], shaper: Shaper) -> ToolTrack:
+    """The weighted mean of copies; line and air words are those of the middle one."""
+    named = copies[shaper.middle]
+    position, velocity, acceleration, flow = (
+        np.tensordot(shaper.weight, np.stack([getattr(copy, name) for copy in copies]), axes=1)
+        for name in ("position_G", "velocity", "acceleration", "flow")
+    )
+    return ToolTrack(named.tick, named.line, position, velocity, acceleration, flow, named.air)

@@ -55,7 +55,7 @@ class Survey:
         if len(every) <= 2:
             return np.arange(every.start, every.stop)
         if isinstance(timed.stretch, Stand):
-            return np.array([every.start, every.stop - 1])
+            return np.unique([*timed.settling, every.start, every.stop - 1])
         found = leg_bounds(timed.stretch)
         if not self._within(timed.stretch, found):
             return np.arange(every.start, every.stop)
