@@ -1,0 +1,51 @@
+"""Quantities along a motion: value, rate and second derivative, carried through sums and products."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cdhr_host.values import Array
+
+
+class Jet(NamedTuple):
+    """A function of time at N instants."""
+
+    value: Array
+    rate: Array
+    bend: Array
+
+    def plus(self, other: "Jet") -> "Jet":
+        """Sum."""
+        return Jet(self.value + other.value, self.rate + other.rate, self.bend + other.bend)
+
+    def times(self, other: "Jet") -> "Jet":
+        """Product."""
+        return Jet(
+            self.value * other.value,
+            self.rate * other.value + self.value * other.rate,
+            self.bend * other.value + 2.0 * (self.rate * other.rate) + self.value * other.bend,
+        )
+
+    def scaled(self, factor: float) -> "Jet":
+        """Times a constant."""
+        return Jet(self.value * factor, self.rate * factor, self.bend * factor)
+
+    def shifted(self, constant: float) -> "Jet":
+        """Plus a constant."""
+        return Jet(self.value + constant, self.rate, self.bend)
+
+    def inverse_root(self) -> "Jet":
+        """To the power of -1/2."""
+        root = 1.0 / np.sqrt(self.value)
+        cube = root / self.value
+        return Jet(
+            root,
+            -0.5 * cube * self.rate,
+            0.75 * cube / self.value * self.rate * self.rate - 0.5 * cube * self.bend,
+        )
+
+
+def constant(value: float, like: Jet) -> Jet:
+    """The same number at every instant of ``like``."""
+    still = np.zeros_like(like.value)
+    return Jet(still + value, still, still)

@@ -1,0 +1,139 @@
+"""The best spring field of a machine: the smallest margin of all nine cables, as large as can be.
+
+At a pose every margin is affine in the spring's force s, and s is linear in the field's
+coefficients. What is minimised is the soft worst margin log sum exp(-p margin) / p, summed over a
+grid of the workspace: convex, with Newton's method. p grows from round to round; poses near the
+edge of what is possible count most, those beyond it hardly. After each round the cables'
+directions are taken anew from where the upper platform then stands.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cdhr_host.mechanism.cables import Cables, Loads
+from cdhr_host.mechanism.kinematics import reachable
+from cdhr_host.mechanism.pairs import Pairs
+from cdhr_host.mechanism.pulley import Vector
+from cdhr_host.mechanism.response import Response, Windows, response
+from cdhr_host.mechanism.spring_field import RISE, ROWS, SPLITS, Domain, SpringField, basis
+from cdhr_host.units import DEG
+from cdhr_host.values import Array, Flags
+
+ROUNDS: Final = ((8.0, 6), (20.0, 5), (40.0, 5), (80.0, 5), (150.0, 5))
+"""(sharpness p, Newton steps)"""
+RADII: Final = np.linspace(0.0, 0.9666, 14)
+"""of the domain's radius"""
+AZIMUTHS: Final = np.linspace(0.0, 60.0, 5) * DEG
+"""the rest of the circle follows by symmetry"""
+HEIGHTS: Final = 26
+NEAR: Final = 0.06
+"""a margin this far below zero counts as beyond what is possible"""
+START: Final = 1.5
+"""spring force to begin with, of the middle of the lower window"""
+DAMPINGS: Final = 8
+"""tries of a Newton step, each damped six times as much"""
+
+
+@dataclass(slots=True)
+class _Fit:
+    """One fit under way."""
+
+    response: Response
+    windows: Windows
+    basis: Array
+    """(N, 3, M)"""
+    weight: Array
+    """(N,) what each pose counts"""
+    damping: float = 1e-3
+
+    def spring(self, coefficients: Array) -> Array:
+        """(M,) -> (N, 3) N."""
+        return np.asarray(self.basis @ coefficients, dtype=np.float64)
+
+    def worst(self, coefficients: Array, sharpness: float) -> tuple[float, Array, Array]:
+        """The sum, and each pose's slope (N, 3) and curvature (N, 3, 3) by its spring force."""
+        half = 0.5 * (self.windows.high - self.windows.low)
+        rise = self.response.gain / half[:, None]
+        slopes = np.concatenate([rise, -rise], axis=1)
+        margin = self.windows.margins(self.response.force(self.spring(coefficients)))
+        least = margin.min(axis=1, keepdims=True)
+        share = np.exp(-sharpness * (margin - least))
+        total = share.sum(axis=1, keepdims=True)
+        share /= total
+        value = self.weight @ (np.log(total[:, 0]) / sharpness - least[:, 0])
+        slope = -np.einsum("ni,nij->nj", share, slopes)
+        curve = (share[:, :, None] * slopes).transpose(0, 2, 1) @ slopes
+        return float(value), slope, sharpness * (curve - slope[:, :, None] * slope[:, None, :])
+
+    def step(self, coefficients: Array, sharpness: float) -> Array:
+        """One damped Newton step; the same coefficients where none gets better."""
+        value, slope, curve = self.worst(coefficients, sharpness)
+        gradient = np.einsum("nkm,nk->m", self.basis, self.weight[:, None] * slope)
+        root = np.linalg.cholesky(curve + 1e-7 * np.eye(3)).transpose(0, 2, 1)
+        rows = (np.sqrt(self.weight)[:, None, None] * (root @ self.basis)).reshape(-1, len(coefficients))
+        hessian = rows.T @ rows
+        scale = float(np.diag(hessian).mean()) * np.eye(len(coefficients))
+        for _ in range(DAMPINGS):
+            trial = coefficients - np.linalg.solve(hessian + self.damping * scale, gradient)
+            if self.worst(trial, sharpness)[0] < value:
+                self.damping = max(self.damping / 6.0, 1e-7)
+                return np.asarray(trial, dtype=np.float64)
+            self.damping *= 6.0
+        return coefficients
+
+
+def best_field(cables: Cables, loads: Loads, pairs: Pairs, windows: Windows, rows: Flags) -> SpringField:
+    """``rows`` (ROWS,) of the coefficients are free, the others zero; HEIGHT_ONLY: upright."""
+    domain = whole_machine(cables)
+    places = _grid(cables, domain)
+    used = np.repeat(rows, RISE + 1)
+    full = np.zeros(len(used))
+    full[SPLITS[1] * (RISE + 1)] = START * 0.5 * (windows.low[0] + windows.high[0])
+    coefficients = full[used]
+    matrix = basis(domain, (places[:, 0], places[:, 1], places[:, 2]))[:, :, used]
+    start = matrix @ coefficients
+    fit = _Fit(_answer(cables, loads, pairs, places, start), windows, matrix, np.ones(len(places)))
+    for sharpness, steps in ROUNDS:
+        for _ in range(steps):
+            coefficients = fit.step(coefficients, sharpness)
+        spring = fit.spring(coefficients)
+        fit.response = _answer(cables, loads, pairs, places, spring)
+        fit.weight = _importance(windows.margins(fit.response.force(spring)).min(axis=1))
+    full[used] = coefficients
+    return SpringField(domain, full.reshape(ROWS, RISE + 1))
+
+
+def whole_machine(cables: Cables) -> Domain:
+    """Where three lower cables can hold: inside the pulleys' triangle less the platform, off both planes."""
+    out = np.linalg.norm(cables.anchors[0, :2]) - np.linalg.norm(cables.attachments[0, :2])
+    floor, gap = float(cables.anchors[0, 2]), float(cables.anchors[3, 2] - cables.anchors[0, 2])
+    base = float(cables.attachments[0, 2])
+    return Domain(0.5 * float(out), floor + gap / 9.0 - base, floor + gap * 0.807 - base)
+
+
+def offset(loads: Loads, spring: Vector) -> Vector:
+    """Spring force on the lower platform, N -> displacement of the upper one minus the lower's, m."""
+    x, y, z = spring
+    size = np.sqrt(x * x + y * y + z * z)
+    longer = 1.0 / loads.stiffness + loads.rest_length / size
+    return x * longer, y * longer, z * longer - loads.separation
+
+
+def _answer(cables: Cables, loads: Loads, pairs: Pairs, places: Array, spring: Array) -> Response:
+    moved = offset(loads, (spring[:, 0], spring[:, 1], spring[:, 2]))
+    return response(cables, loads, pairs, places, places + np.column_stack(moved))
+
+
+def _importance(margin: Array) -> Array:
+    beyond = 0.3 * NEAR / np.maximum(np.abs(margin), NEAR)
+    return np.where(margin > -NEAR, 1.0 / (0.02 + np.abs(margin)), beyond)
+
+
+def _grid(cables: Cables, domain: Domain) -> Array:
+    r, turn, z = np.meshgrid(
+        RADII * domain.radius, AZIMUTHS, np.linspace(domain.low, domain.high, HEIGHTS), indexing="ij"
+    )
+    places = np.column_stack([(r * np.cos(turn)).ravel(), (r * np.sin(turn)).ravel(), z.ravel()])
+    return places[reachable(cables, places, places)]
