@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from cdhr_host.profile.fields import IN_MM, IN_N_MM, Section, key, to_si
-from cdhr_host.units import MM
+from cdhr_host.profile.fields import IN_DEG, IN_MM, IN_N_MM, Section, key, to_si
+from cdhr_host.units import DEG, MM
 
 
 class Machine(Section):
@@ -79,6 +79,14 @@ class Geometry(Section):
     nozzle_length: Annotated[
         float, key("nozzle_length_mm", "lower attachment plane above the nozzle's tip", gt=0, le=1e4), IN_MM
     ] = 200.0 * MM
+    wrap_max: Annotated[
+        float, key("wrap_max_deg", "greatest wrap of a cable about its pulley", gt=0, le=90), IN_DEG
+    ] = 90.0 * DEG
+    fleet_max: Annotated[
+        float,
+        key("fleet_max_deg", "greatest swing of a cable from its pulley's own plane", gt=0, le=90),
+        IN_DEG,
+    ] = 90.0 * DEG
     pulley_model: Annotated[
         Literal["swivel", "fixed-plane", "caster", "point"],
         Field(
