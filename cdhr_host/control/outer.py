@@ -1,8 +1,8 @@
 """The loop for the real rig: a slow integrator on the nozzle's position inside a performance funnel.
 
 The drives hold positions; motor torque through a ball screw is no force control (10 N of cable
-are 6.4 mN m). So this loop only shifts what is commanded. Each new measurement p, taken at t_m,
-moves the shift by
+are 6.4 mN m). So this loop only shifts what is commanded. Until the next measurement, the one p
+taken at t_m moves the shift by
 
     shift' = -Ki rho artanh(|e| / rho) e / |e|,   e = p - plan(t_m),
 
@@ -66,8 +66,8 @@ class OuterState:
     """newest sample used"""
     heard: float
     """s, when that was"""
-    previous: float
-    """s, when the sample before it was used, for the integrator's step"""
+    drift: Array
+    """(3,) m/s of the shift, until the next sample"""
     outside: int
     """samples in a row outside the funnel"""
     began: float | None
@@ -86,14 +86,14 @@ class Outer:
 
     def start(self) -> OuterState:
         """Nothing heard yet: open loop from the start, closed at the first sample."""
-        return OuterState(np.zeros(3), 0.0, Mode.OPEN, None, 0.0, 0.0, 0, None, ())
+        return OuterState(np.zeros(3), 0.0, Mode.OPEN, None, 0.0, np.zeros(3), 0, None, ())
 
     def step(self, state: OuterState, plan: Plan, seen: Seen, dt: float) -> tuple[OuterState, Action]:
         """The shift for the next ``dt`` s; once it says STOP it stays so."""
         before = state.mode
         state = self._remembered(state, plan)
         if before is not Mode.STOP:
-            state = self._listened(state, plan, seen.nozzle)
+            state = self._moved(self._listened(state, plan, seen.nozzle), dt)
             state = self._tightened(state, plan, seen, dt)
         shift = np.concatenate([state.shift, state.shift])
         shift[5] += state.rise
@@ -109,12 +109,12 @@ class Outer:
         """Use a new sample; notice a silent source."""
         if sample is None or sample.frame == state.frame:
             silent = state.mode is Mode.CLOSED and plan.t - state.heard > self.settings.timeout
-            return replace(state, mode=Mode.OPEN) if silent else state
+            return replace(state, mode=Mode.OPEN, drift=np.zeros(3)) if silent else state
         if sample.t < state.past[0][0]:
             return state
         error = sample.position - _planned(state.past, sample.t)
         began = plan.t if state.began is None or state.mode is Mode.OPEN else state.began
-        state = replace(state, began=began, frame=sample.frame, previous=state.heard, heard=plan.t)
+        state = replace(state, began=began, frame=sample.frame, heard=plan.t)
         return self._corrected(state, error, plan.t)
 
     def _corrected(self, state: OuterState, error: Array, t: float) -> OuterState:
@@ -124,15 +124,17 @@ class Outer:
         outside = 0 if pressing < math.inf else state.outside + 1
         if outside >= g.patience:
             return replace(state, mode=Mode.STOP, outside=outside)
-        if outside or size == 0.0:
-            return replace(state, mode=Mode.CLOSED, outside=outside)
-        reopened = state.mode is Mode.OPEN
-        elapsed = 0.0 if reopened else t - state.previous
-        move = min(g.gain * pressing, g.rate) * elapsed
-        shift = state.shift - error * (move / size)
-        if float(np.linalg.norm(shift)) > g.range:
+        speed = 0.0 if outside else min(g.gain * pressing, g.rate)
+        drift = -error * (speed / size) if size > 0.0 else np.zeros(3)
+        return replace(state, mode=Mode.CLOSED, outside=outside, drift=drift)
+
+    def _moved(self, state: OuterState, dt: float) -> OuterState:
+        if state.mode is not Mode.CLOSED:
+            return state
+        shift = state.shift + dt * state.drift
+        if float(np.linalg.norm(shift)) > self.settings.range:
             return replace(state, mode=Mode.STOP)
-        return replace(state, mode=Mode.CLOSED, outside=0, shift=shift)
+        return replace(state, shift=shift)
 
     def _tightened(self, state: OuterState, plan: Plan, seen: Seen, dt: float) -> OuterState:
         """Raise or lower the upper platform until its cables pull as planned."""

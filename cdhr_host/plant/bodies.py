@@ -92,7 +92,7 @@ class Bodies:
         self._arms = tuple((x, y, z + arm) for x, y, z in strands.arms)
         self._centre = strands.lower[0], strands.lower[1], strands.lower[2] - arm
         self._gap = strands.upper[2] - strands.lower[2]
-        rest = _at_reference(strands)
+        rest = self._rest = _at_reference(strands)
         dead = (profile.stretch.lower_dead_length,) * 6 + (profile.stretch.upper_dead_length,) * 3
         self.stiffness = tuple(
             profile.stretch.stiffness / (span + more) for span, more in zip(rest, dead, strict=True)
@@ -108,6 +108,17 @@ class Bodies:
             [natural + slider[i] for natural, i in zip(self._natural, SLIDER, strict=True)],
             [rate[i] for i in SLIDER],
         )
+
+    def run(self, state: BodiesState) -> tuple[float, ...]:
+        """(6,) m the cables are longer than at the reference pose; of a pair their mean."""
+        nine: list[float] = []
+
+        def noted(i: int, length: float, rate: float) -> float:  # noqa: ARG001
+            nine.append(length - self._rest[i])
+            return 0.0
+
+        self._total(state, noted)
+        return (*(0.5 * (a + b) for a, b in zip(nine[:3], nine[3:6], strict=True)), *nine[6:])
 
     def step(self, state: BodiesState, command: Forces | Wound, dt: float) -> BodiesState:
         """The state ``dt`` s later under a command held during the step."""
