@@ -5,7 +5,9 @@ machine (no G92 offset left), ``_W`` machine world (origin at the centre of the 
 pulleys, z up). Index letters: ``n`` sample or move, ``i`` cable.
 """
 
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from enum import Enum
 from typing import Any
 
 import numpy as np
@@ -53,9 +55,20 @@ class Moves(_Frozen):
     """(N,) Pa held by air words along each move, whatever the speed; 0 where E rules"""
 
 
+class Plane(Enum):
+    """A plane of arcs: its two axes, then its normal, right-handed (x, y, z are 0, 1, 2)."""
+
+    XY = (0, 1, 2)
+    """G17"""
+    ZX = (2, 0, 1)
+    """G18"""
+    YZ = (1, 2, 0)
+    """G19"""
+
+
 @dataclass(frozen=True, slots=True)
 class Arc(_Frozen):
-    """One circular or helical move in the XY plane (G2, G3)."""
+    """One circular or helical move (G2, G3)."""
 
     line: int
     start_G: Array
@@ -63,15 +76,42 @@ class Arc(_Frozen):
     end_G: Array
     """(3,) m"""
     centre_G: Array
-    """(2,) m, x and y of the axis"""
+    """(2,) m, the axis on the plane's two axes in their order: x y, z x or y z"""
     sweep: float
-    """rad, signed: positive is counter-clockwise (G3)"""
+    """rad, signed: positive is counter-clockwise (G3), seen from the normal's positive end"""
     speed: float
     """m/s along the helix"""
     clay: float
     """m³ laid along the arc"""
     air: float
     """Pa held by air words; 0 where E rules"""
+    plane: Plane = Plane.XY
+
+
+@dataclass(frozen=True, slots=True)
+class Spline(_Frozen):
+    """One cubic Bézier move (G5, and G5.1 raised to a cubic)."""
+
+    line: int
+    control_G: Array
+    """(4, 3) m: start, two control points, end"""
+    speed: float
+    """m/s along the curve"""
+    clay: float
+    """m³ laid along the curve, evenly by its length"""
+    air: float
+    """Pa held by air words; 0 where E rules"""
+
+
+@dataclass(frozen=True, slots=True)
+class Blend:
+    """How corners are taken from here on (G61, G64)."""
+
+    line: int
+    tolerance: float | None
+    """m, greatest deviation from the drawn path; None for the profile's"""
+    exact: bool
+    """the end of every move is an exact stop"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +159,7 @@ class Notice:
     text: str
 
 
-Command = Moves | Arc | Dwell | Prime | Pause | Stop | Notice
+Command = Moves | Arc | Spline | Blend | Dwell | Prime | Pause | Stop | Notice
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,6 +183,12 @@ class ToolTrack(_Frozen):
 
     def __getitem__(self, rows: slice | Flags) -> "ToolTrack":
         return ToolTrack(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+    @classmethod
+    def joined(cls, parts: "Sequence[ToolTrack]") -> "ToolTrack":
+        """One after the other."""
+        columns = ([getattr(part, field.name) for part in parts] for field in fields(cls))
+        return cls(*(np.concatenate(column) for column in columns))
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,6 +251,8 @@ class Feedback(_Frozen):
     """(N, 6) N m at the motor"""
     pressure: Array
     """(N,) Pa, measured"""
+    force: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    """(N, 3) N, measured forces of cables 1-3; (0, 3) where there are no sensors"""
 
     def __len__(self) -> int:
         return len(self.tick)

@@ -3,6 +3,7 @@
 from enum import Enum
 from typing import Protocol
 
+from cdhr_host.drives.timing import CycleTiming
 from cdhr_host.profile.schema import Profile
 from cdhr_host.values import Array, Feedback, Setpoints
 
@@ -57,6 +58,19 @@ class MachineLink(Protocol):
     @property
     def stop_tick(self) -> int | None:
         """First tick of the path-true stop (``motion.hold``) since arming; None when there is none."""
+        ...
+
+    @property
+    def resolution(self) -> float:
+        """M a setpoint is rounded to on its way; 0 when it is not."""
+        ...
+
+    def timing(self) -> CycleTiming | None:
+        """How punctual the cycles since arming were; None for a link without cycles of its own."""
+        ...
+
+    def stop_rows(self, ahead: Setpoints) -> Setpoints:
+        """Rows fed for ``stop_tick`` and later -> the rows the link plays instead."""
         ...
 
     def open(self) -> None:

@@ -6,35 +6,29 @@ no tick passes and the plant stands still.
 """
 
 import math
-from typing import Final
 
 import numpy as np
 
-from cdhr_host.drives.checks import STANDS_WITHIN, check_rows, check_standing
+from cdhr_host.drives.buffer import RowBuffer
+from cdhr_host.drives.checks import check_standing
 from cdhr_host.drives.clock import Clock
 from cdhr_host.drives.link import LinkState
-from cdhr_host.drives.rows import RowQueue, joined, no_feedback
+from cdhr_host.drives.rows import joined, no_feedback
+from cdhr_host.drives.timing import CycleTiming
 from cdhr_host.drives.watch import first_fault, underrun
 from cdhr_host.errors import DriveError, Problem
-from cdhr_host.motion.hold import ends_at_rest, path_true_stop, rows_needed
+from cdhr_host.motion.hold import path_true_stop
 from cdhr_host.plant import Disturbance, Machine, undisturbed
 from cdhr_host.profile.schema import Profile
 from cdhr_host.values import Array, Feedback, Setpoints
-
-LOOK_AHEAD: Final = 0.5
-"""s of real time the buffer lasts beyond the reserve for a stop"""
-MAX_LOOK_AHEAD: Final = 20_000
-"""rows beyond the reserve, however fast the clock"""
 
 
 class Loopback:
     """Six simulated servo axes and a pressure regulator behind a buffer of setpoints.
 
-    The buffer holds LOOK_AHEAD of real time, more rows for a faster clock, and beyond that
-    the reserve a path-true stop needs. The reserve is touched only by a stop, or when the
-    last row fed is at rest with the air off; a tick that is due when nothing else is left
-    is an underrun. The first row is executed when half the look-ahead is there, or a
-    rest. ``standing`` (6,) m is where the sliders stand at first, the reference pose if None.
+    A tick that is due when only the reserve for a stop is left is an underrun. The first row
+    is executed when half the look-ahead is there, or a rest. ``standing`` (6,) m is where the
+    sliders stand at first, the reference pose if None.
     """
 
     def __init__(
@@ -51,17 +45,12 @@ class Loopback:
         self._clock = clock
         self._machine = Machine(profile, disturbance)
         self._plant = self._machine.standing(np.zeros(6) if standing is None else standing)
-        self._queue = RowQueue()
+        self._buffer = RowBuffer(profile, clock.speed)
         self._executed: list[Feedback] = []
-        self._reserve = rows_needed(profile)
-        self._look_ahead = math.ceil(min(LOOK_AHEAD * clock.speed / profile.drives.period, MAX_LOOK_AHEAD))
         self._fault: DriveError | None = None
         self._told = True
         self._epoch: float | None = None
         self._ticks = 0
-        self._next_tick: int | None = None
-        self._tail = np.zeros((2, 6))
-        self._silent = True
         self._rested_at = clock.now()
 
     @property
@@ -69,12 +58,25 @@ class Loopback:
         """Rows that ``feed`` would accept."""
         if self.state not in (LinkState.ARMED, LinkState.RUNNING):
             return 0
-        return self._reserve + self._look_ahead - len(self._queue)
+        return self._buffer.free
 
     @property
     def buffered(self) -> int:
         """Rows accepted and not executed yet."""
-        return len(self._queue)
+        return len(self._buffer)
+
+    @property
+    def resolution(self) -> float:
+        """M: the rows are taken as they are."""
+        return 0.0
+
+    def timing(self) -> CycleTiming | None:
+        """Simulated time is never late."""
+        return None
+
+    def stop_rows(self, ahead: Setpoints) -> Setpoints:
+        """What is played instead of ``ahead`` once the link stops."""
+        return path_true_stop(ahead, self.profile)
 
     def open(self) -> None:
         """CLOSED -> OPEN; an earlier fault is forgotten."""
@@ -90,8 +92,8 @@ class Loopback:
         self._plant = self._machine.standing(
             self._plant.slider, setpoint=start, pressure=self._plant.pressure, rested=rested
         )
-        self.stop_tick, self._next_tick = None, None
-        self._tail, self._silent = np.stack([start, start]), True
+        self.stop_tick = None
+        self._buffer.start(start)
         self.state = LinkState.ARMED
 
     def feed(self, setpoints: Setpoints) -> int:
@@ -99,15 +101,11 @@ class Loopback:
         self._execute_due()
         self._raise_fault()
         self._expect(LinkState.ARMED, LinkState.RUNNING)
-        if not len(setpoints):
-            return 0
-        fresh = self.state is LinkState.ARMED and self._next_tick is None
-        reach = STANDS_WITHIN if fresh else None
-        check_rows(setpoints, self.profile, tick=self._next_tick, before=self._tail[1], reach=reach)
-        accepted = setpoints[: self.free]
-        if len(accepted):
-            self._accept(accepted)
-        return len(accepted)
+        count = self._buffer.feed(setpoints)
+        if self._epoch is None and self._buffer.primed:
+            self._epoch, self._ticks = self._clock.now(), 0
+            self.state = LinkState.RUNNING
+        return count
 
     def feedback(self) -> Feedback:
         """What was executed since the last call."""
@@ -122,7 +120,7 @@ class Loopback:
         if self.state is LinkState.CLOSED:
             self._expect(LinkState.OPEN)
         elif self.state is LinkState.ARMED:
-            self._queue.clear()
+            self._buffer.drop()
             self._rest()
         elif self.state is LinkState.RUNNING:
             self._begin_stop()
@@ -132,8 +130,8 @@ class Loopback:
         if self.state is LinkState.CLOSED:
             return
         self.stop()
-        while len(self._queue):
-            self._play(self._queue.take(len(self._queue)))
+        while len(self._buffer):
+            self._play(self._buffer.take(len(self._buffer)))
         self._executed = []
         self.state = LinkState.CLOSED
 
@@ -149,45 +147,24 @@ class Loopback:
             self._told = True
             raise self._fault
 
-    def _accept(self, rows: Setpoints) -> None:
-        self._queue.append(rows)
-        self._next_tick = int(rows.tick[-1]) + 1
-        self._tail = np.vstack([self._tail, rows.slider[-2:]])[-2:]
-        self._silent = bool(rows.pressure[-1] == 0.0)
-        primed = len(self._queue) >= self._reserve + self._look_ahead // 2
-        if self._epoch is None and (primed or self._may_run_dry()):
-            self._epoch, self._ticks = self._clock.now(), 0
-            self.state = LinkState.RUNNING
-
-    def _may_run_dry(self) -> bool:
-        """Whether the last row fed is at rest with the air off, or ends a stop."""
-        return self.state is LinkState.STOPPING or (self._silent and ends_at_rest(self._tail, self.profile))
-
     def _execute_due(self) -> None:
         """Execute all ticks that are due by the clock, and find out when they run out."""
         while self._epoch is not None:
             due = self._due(self._epoch)
-            left = len(self._queue) - (0 if self._may_run_dry() else self._reserve)
-            count = min(due, left)
+            count = min(due, self._buffer.ready)
             if count > 0:
                 self._ticks += count
-                self._play(self._queue.take(count))
-            elif not len(self._queue):
+                self._play(self._buffer.take(count))
+            elif not len(self._buffer):
                 self._rest()
             elif due > 0:
-                self._trip(underrun(*self._head()))
+                self._trip(underrun(*self._buffer.head()))
             else:
                 return
 
     def _due(self, epoch: float) -> int:
         elapsed = (self._clock.now() - epoch) / self.profile.drives.period
         return math.floor(elapsed + 1e-6) - self._ticks
-
-    def _head(self) -> tuple[int, int]:
-        """Tick and line of the next row in the buffer."""
-        row = self._queue.take(1)
-        self._queue.put_back(row)
-        return int(row.tick[0]), int(row.line[0])
 
     def _play(self, rows: Setpoints) -> None:
         """Execute rows; from the first one out of its windows on, play the stop instead."""
@@ -201,7 +178,7 @@ class Loopback:
         self._plant, executed = self._machine.step(self._plant, rows[: row + 1])
         self._executed.append(executed)
         self._ticks -= len(rows) - row - 1
-        self._queue.put_back(rows[row + 1 :])
+        self._buffer.put_back(rows[row + 1 :])
         self._trip(fault)
 
     def _trip(self, fault: DriveError) -> None:
@@ -212,13 +189,9 @@ class Loopback:
     def _begin_stop(self) -> None:
         """Replace what is buffered by its path-true stop."""
         self.state = LinkState.STOPPING
-        if not len(self._queue):
+        self.stop_tick = self._buffer.begin_stop()
+        if self.stop_tick is None:
             self._rest()
-            return
-        stop = path_true_stop(self._queue.take(len(self._queue)), self.profile)
-        self._queue.clear()
-        self._queue.append(stop)
-        self.stop_tick = int(stop.tick[0])
 
     def _rest(self) -> None:
         """Nothing is left to execute."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from typing import Final
 
 import numpy as np
 
@@ -11,10 +12,12 @@ from cdhr_host.drives.rows import RowQueue
 from cdhr_host.errors import DriveError, JobError, Problem
 from cdhr_host.job.tally import RunSummary, Tally
 from cdhr_host.job.waiting import wait_for_credit
-from cdhr_host.motion.hold import ends_at_rest, path_true_stop
+from cdhr_host.motion.hold import ends_at_rest
 from cdhr_host.units import MM
 from cdhr_host.values import Array, Feedback, Setpoints
 
+ROUNDED: Final = 0.5 + 1e-4
+"""of the resolution: what rounding to the nearest may change"""
 Observer = Callable[[Setpoints, Feedback], None]
 
 
@@ -84,7 +87,8 @@ class Streamer:
         except BaseException:
             self._bring_to_rest()
             raise
-        return self._tally.summary(self._link.profile.drives.period, interrupted=self._interrupted)
+        period = self._link.profile.drives.period
+        return self._tally.summary(period, interrupted=self._interrupted, timing=self._link.timing())
 
     def _turn(self) -> bool:
         """Feed and collect once; whether the run is over."""
@@ -135,7 +139,7 @@ class Streamer:
         if len(feedback) > len(self._sent):
             raise DriveError(Problem("echo", "the drives executed more rows than were sent"))
         rows = self._sent.take(len(feedback))
-        _check_echo(rows, feedback)
+        _check_echo(rows, feedback, self._link.resolution)
         self._tally.add(rows, feedback)
         self._on_rows(rows, feedback)
 
@@ -148,7 +152,7 @@ class Streamer:
         rows = self._sent.take(len(self._sent))
         as_sent = int(np.searchsorted(rows.tick, tick))
         self._sent.append(rows[:as_sent])
-        self._sent.append(path_true_stop(rows[as_sent:], self._link.profile))
+        self._sent.append(self._link.stop_rows(rows[as_sent:]))
 
     def _bring_to_rest(self) -> None:
         """Stop; further errors on the way give way to the one that is being raised."""
@@ -161,13 +165,14 @@ class Streamer:
                 self._collect()
 
 
-def _check_echo(rows: Setpoints, feedback: Feedback) -> None:
-    """DriveError unless the far side received exactly the rows sent."""
-    other = (feedback.setpoint != rows.slider).any(axis=1) | (feedback.tick != rows.tick)
+def _check_echo(rows: Setpoints, feedback: Feedback, resolution: float) -> None:
+    """DriveError unless the far side received exactly the rows sent, rounded to ``resolution`` m."""
+    away = np.abs(feedback.setpoint - rows.slider)
+    other = (away > resolution * ROUNDED).any(axis=1) | (feedback.tick != rows.tick)
     if not other.any():
         return
     row = int(other.argmax())
-    axis = int((feedback.setpoint[row] != rows.slider[row]).argmax())
+    axis = int(away[row].argmax())
     sent, executed = rows.slider[row, axis] / MM, feedback.setpoint[row, axis] / MM
     raise DriveError(
         Problem(

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdhr_host.drives.timing import CycleTiming
 from cdhr_host.values import Array, Feedback, Setpoints
 
 
@@ -28,6 +29,8 @@ class RunSummary:
     """Pa, greatest distance of the pressure from its command"""
     interrupted: bool
     """stopped on request before the program's end"""
+    timing: CycleTiming | None = None
+    """how punctual the sender was; None for drives without one"""
 
 
 class Tally:
@@ -51,7 +54,7 @@ class Tally:
         self._torque = np.maximum(self._torque, np.abs(feedback.torque).max(axis=0))
         self._pressure = max(self._pressure, float(np.abs(feedback.pressure - rows.pressure).max()))
 
-    def summary(self, period: float, *, interrupted: bool) -> RunSummary:
+    def summary(self, period: float, *, interrupted: bool, timing: CycleTiming | None = None) -> RunSummary:
         """The run so far."""
         return RunSummary(
             ticks=self._ticks,
@@ -63,4 +66,5 @@ class Tally:
             torque_max=self._torque,
             pressure_deviation_max=self._pressure,
             interrupted=interrupted,
+            timing=timing,
         )

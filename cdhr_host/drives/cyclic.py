@@ -1,0 +1,356 @@
+"""A link whose drives take one setpoint a cycle: the buffer is here, the cycle too.
+
+``turn`` is one cycle; whoever owns the link calls it again and again, in time. All other
+calls only look at or change what the next cycle will do, except ``open``, ``arm`` and
+``close``, which run cycles until they are done.
+"""
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cdhr_host.drives.buffer import RowBuffer
+from cdhr_host.drives.canopen.axis import Axis
+from cdhr_host.drives.canopen.bus import Bus
+from cdhr_host.drives.canopen.homing import home
+from cdhr_host.drives.canopen.machine import DEPTH, CanopenMachine
+from cdhr_host.drives.canopen.port import Port
+from cdhr_host.drives.canopen.scaling import Scaling
+from cdhr_host.drives.checks import check_standing
+from cdhr_host.drives.clock import Clock
+from cdhr_host.drives.faults import fault
+from cdhr_host.drives.link import LinkState
+from cdhr_host.drives.reference import ReferenceStore, unreferenced
+from cdhr_host.drives.rows import joined, no_feedback
+from cdhr_host.drives.timing import CycleTiming
+from cdhr_host.drives.watch import first_fault, underrun
+from cdhr_host.errors import DriveError, Problem
+from cdhr_host.motion.hold import path_true_stop
+from cdhr_host.profile.schema import Profile
+from cdhr_host.values import Array, Feedback, Ints, Setpoints
+
+LINGER: Final = 0.05
+"""s the drives hold position after a run before their brakes close"""
+EASE: Final = 25
+"""cycles in which the last micrometres to a run's start are covered"""
+MOVING = (LinkState.RUNNING, LinkState.STOPPING)
+
+
+@dataclass(slots=True)
+class _Sent:
+    row: Setpoints
+    counts: Ints
+
+
+class CyclicLink:
+    """MachineLink over CANopen; ``connect`` opens the bus, ``store`` keeps references."""
+
+    def __init__(
+        self, profile: Profile, clock: Clock, connect: Callable[[], Port], store: ReferenceStore
+    ) -> None:
+        self.profile = profile
+        self.state = LinkState.CLOSED
+        self.stop_tick: int | None = None
+        self.resolution = profile.canopen.position_unit
+        self._connect = connect
+        self._machine: CanopenMachine | None = None
+        self._clock = clock
+        self._store = store
+        self._scaling = Scaling(profile)
+        self._buffer = RowBuffer(profile, clock.speed)
+        self._flying: deque[_Sent | None] = deque()
+        self._executed: list[Feedback] = []
+        self._fault: DriveError | None = None
+        self._told = True
+        self._held: Ints = np.zeros(6, dtype=np.int64)
+        self._rested_at: float | None = None
+        self._pressure = 0.0
+        self._playing = False
+        self._homed = False
+
+    @property
+    def machine(self) -> CanopenMachine:
+        """The master; DriveError while the link is closed."""
+        if self._machine is None:
+            raise DriveError(Problem("state", "the drives are closed, not open"))
+        return self._machine
+
+    @property
+    def due(self) -> float:
+        """When the next ``turn`` begins; infinite when there is no cycle."""
+        return math.inf if self._machine is None else self._machine.due
+
+    @property
+    def free(self) -> int:
+        """Rows that ``feed`` would accept."""
+        return self._buffer.free if self.state in (LinkState.ARMED, LinkState.RUNNING) else 0
+
+    @property
+    def buffered(self) -> int:
+        """Rows accepted whose outcome has not come back."""
+        return len(self._buffer) + sum(sent is not None for sent in self._flying)
+
+    @property
+    def slider(self) -> Array:
+        """(6,) m, as last answered."""
+        return self._scaling.slider(self.machine.position)
+
+    @property
+    def notes(self) -> list[str]:
+        """What bring-up and the cycles noticed without stopping."""
+        return [*self.machine.found.notes, *self.machine.watch.warnings]
+
+    def timing(self) -> CycleTiming | None:
+        """Lateness of the cycles since arming."""
+        return self._machine.lateness.summary() if self._machine is not None else None
+
+    def stop_rows(self, ahead: Setpoints) -> Setpoints:
+        """What is played instead of ``ahead`` once the link stops."""
+        return path_true_stop(ahead, self.profile)
+
+    def open(self) -> None:
+        """CLOSED -> OPEN: bring-up."""
+        self._expect(LinkState.CLOSED)
+        self._fault, self._told, self._homed = None, True, False
+        self._scaling = Scaling(self.profile)
+        port = self._connect()
+        try:
+            machine = CanopenMachine(self.profile, Bus(port, self._clock))
+            machine.open()
+        except BaseException:
+            port.close()
+            raise
+        self._machine = machine
+        self.state = LinkState.OPEN
+
+    def arm(self, start: Array) -> None:
+        """OPEN or STOPPED -> ARMED: enabled, holding (6,) m ``start``."""
+        self._expect(LinkState.OPEN, LinkState.STOPPED)
+        self._check_referenced()
+        check_standing(start, self.slider)
+        for axis in self.machine.axes:
+            self._check_ready(axis)
+        self._held = self.machine.enable()
+        self._ease(self._scaling.counts(start))
+        self.machine.lateness.reset()
+        self._buffer.start(start)
+        self._flying.clear()
+        self._playing = False
+        self.stop_tick, self._rested_at = None, None
+        self.state = LinkState.ARMED
+
+    def feed(self, setpoints: Setpoints) -> int:
+        """Buffer the first rows there is credit for; how many."""
+        self._raise_fault()
+        self._expect(LinkState.ARMED, LinkState.RUNNING)
+        self._scaling.feed_forward(np.where(np.isfinite(setpoints.tension), setpoints.tension, 0.0))
+        count = self._buffer.feed(setpoints)
+        if self._buffer.primed:
+            self.state, self._playing = LinkState.RUNNING, True
+        return count
+
+    def feedback(self) -> Feedback:
+        """What was executed since the last call."""
+        self._raise_fault()
+        executed, self._executed = self._executed, []
+        return joined(executed) if executed else no_feedback()
+
+    def stop(self) -> None:
+        """Come to rest on the path, air off."""
+        if self.state is LinkState.CLOSED:
+            self._expect(LinkState.OPEN)
+        elif self.state is LinkState.ARMED:
+            self._buffer.drop()
+            self._rest()
+        elif self.state is LinkState.RUNNING:
+            self._begin_stop()
+
+    def close(self) -> None:
+        """-> CLOSED; what moves is stopped on the path first, then the drives lose their voltage."""
+        if self.state is LinkState.CLOSED:
+            return
+        self.stop()
+        while self.state is LinkState.STOPPING or self._rested_at is not None:
+            self.turn()
+        if math.isfinite(self.machine.due):
+            self._farewell()
+        self.machine.bus.port.close()
+        self._machine = None
+        self._executed = []
+        self.state = LinkState.CLOSED
+
+    def home(self) -> None:
+        """Reference every axis by homing, mode 6, one slider at a time. OPEN only."""
+        self._expect(LinkState.OPEN, LinkState.STOPPED)
+        home(self.machine)
+        self._homed = True
+        self.machine.watch.unreferenced.clear()
+        self._store.save(self.profile, self.machine.found.serials, np.zeros(6, dtype=np.int64))
+
+    def set_reference(self) -> None:
+        """The machine stands at its reference pose: remember it for each drive's serial number."""
+        self._expect(LinkState.OPEN, LinkState.STOPPED)
+        self._store.save(self.profile, self.machine.found.serials, self.machine.position)
+        self.machine.watch.unreferenced.clear()
+
+    def turn(self) -> None:
+        """One cycle: waits for it, listens, and tells the next setpoint."""
+        try:
+            for finding in self.machine.listen():
+                self._trip(finding)
+            self._land()
+            sent = self._next()
+            self._flying.append(sent)
+            self._tell(sent)
+        except DriveError as gone:
+            self._lose(gone)
+
+    def _tell(self, sent: _Sent | None) -> None:
+        if sent is None:
+            self._pressure = 0.0
+            self.machine.hold(self._held if self.machine.watch.enabled else None)
+        else:
+            self._pressure = float(sent.row.pressure[0])
+            self._held = sent.counts
+            torque = self._scaling.feed_forward(sent.row.tension[0])
+            self.machine.tell(sent.counts, torque, self._scaling.pressure_raw(self._pressure))
+
+    def _next(self) -> _Sent | None:
+        """The row of this cycle; None to hold."""
+        self.machine.streaming = self.state in MOVING
+        if self.state not in MOVING:
+            self._linger()
+            return None
+        if self._playing and self._buffer.ready <= 0 and len(self._buffer):
+            self._trip(underrun(*self._buffer.head()))
+        if len(self._buffer) and (self._playing or self.state is LinkState.STOPPING):
+            row = self._buffer.take(1)
+            return _Sent(row, self._scaling.counts(row.slider[0]))
+        self._playing = False
+        self._rest_when_landed()
+        return None
+
+    def _rest_when_landed(self) -> None:
+        if self.state is LinkState.STOPPING and not any(self._flying):
+            self._rest()
+
+    def _land(self) -> None:
+        """What the answers just read say about the row told DEPTH cycles ago."""
+        done = self._flying.popleft() if len(self._flying) == DEPTH else None
+        if done is not None:
+            feedback = self._outcome(done)
+            self._executed.append(feedback)
+            found = first_fault(done.row, feedback, self.profile.drives)
+            if found is not None:
+                self._trip(found[1])
+        for finding in self._watched(self._clock.now()):
+            self._trip(finding)
+
+    def _watched(self, now: float) -> Iterator[DriveError]:
+        if self.state not in (LinkState.ARMED, *MOVING):
+            return
+        raw = self.machine.inputs[0]
+        yield from self.machine.watch.pressure(now, self._pressure, self._scaling.pressure(raw), raw)
+        if self.machine.digital is not None and not self.machine.digital & 1:
+            yield fault("emergency-stop", "the emergency stop is pressed")
+        elif self.machine.digital is not None and not self.machine.digital & 2:
+            yield fault("air-lost", "the coupler reports no air supply")
+
+    def _outcome(self, done: _Sent) -> Feedback:
+        position = self.machine.position
+        torque = np.array([axis.torque for axis in self.machine.axes], dtype=np.float64)
+        raw = self.machine.inputs
+        return Feedback(
+            tick=done.row.tick,
+            setpoint=self._scaling.slider(done.counts)[None],
+            slider=self._scaling.slider(position)[None],
+            counts=position[None],
+            torque=self._scaling.torque(torque)[None],
+            pressure=np.array([self._scaling.pressure(raw[0])]),
+            force=np.array([[self._scaling.force(value) for value in raw[1:]]]),
+        )
+
+    def _trip(self, found: DriveError) -> None:
+        if self._fault is not None:
+            return
+        self._fault, self._told = found, False
+        if self.state is LinkState.RUNNING:
+            self._begin_stop()
+        elif self.state is not LinkState.STOPPING:
+            self._rest()
+
+    def _lose(self, gone: DriveError) -> None:
+        """The bus is gone: nothing can be told any more; the drives' own watchdogs stop them."""
+        self._fault = self._fault or gone
+        self._told = False
+        self._buffer.drop()
+        self._flying.clear()
+        self._rested_at = None
+        self.machine.due = math.inf
+        self.state = LinkState.FAULT
+
+    def _begin_stop(self) -> None:
+        self.state = LinkState.STOPPING
+        self.stop_tick = self._buffer.begin_stop()
+        self._rest_when_landed()
+
+    def _rest(self) -> None:
+        self.state = LinkState.FAULT if self._fault is not None else LinkState.STOPPED
+        self._rested_at = self._clock.now()
+
+    def _linger(self) -> None:
+        """Some time after a run the brakes close."""
+        if self._rested_at is not None and self._clock.now() - self._rested_at >= LINGER:
+            self._rested_at = None
+            self.machine.disable()
+
+    def _ease(self, start: Ints) -> None:
+        """From where the axes were enabled to a run's start, smoothly."""
+        held = self._held
+        for k in range(1, EASE + 1):
+            z = k / EASE
+            at = np.rint(held + (start - held) * z * z * (3.0 - 2.0 * z)).astype(np.int64)
+            if findings := list(self.machine.listen()):
+                self.machine.disable()
+                raise findings[0]
+            self.machine.hold(at)
+        self._held = start
+
+    def _farewell(self) -> None:
+        """Voltage off and a few cycles to say so; a bus that is gone needs no farewell."""
+        self.machine.release()
+        for _ in range(3):
+            self.turn()
+
+    def _check_referenced(self) -> None:
+        """DriveError with the next step unless every axis knows the reference pose."""
+        lost = sorted(axis + 1 for axis in self.machine.watch.unreferenced)
+        if lost:
+            raise unreferenced(lost)
+        mode = self.profile.canopen.reference
+        if mode == "stored":
+            self._scaling = Scaling(self.profile, self._store.zero(self.profile, self.machine.found.serials))
+        elif mode == "homing" and not self._homed:
+            raise unreferenced([1, 2, 3, 4, 5, 6])
+
+    def _check_ready(self, axis: Axis) -> None:
+        if axis.state.value.startswith("fault"):
+            raise fault(
+                "drive-fault", f"drive {axis.node} is in fault (0x{axis.error:04X}): nothing may move"
+            )
+
+    def _expect(self, *states: LinkState) -> None:
+        if self.state is LinkState.FAULT and self._fault is not None:
+            raise self._fault
+        if self.state not in states:
+            wanted = " or ".join(state.value for state in states)
+            raise DriveError(Problem("state", f"the drives are {self.state.value}, not {wanted}"))
+
+    def _raise_fault(self) -> None:
+        if self._fault is not None and not self._told:
+            self._told = True
+            raise self._fault

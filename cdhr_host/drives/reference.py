@@ -1,0 +1,76 @@
+"""Where the reference pose is, for each drive by its serial number."""
+
+import json
+import os
+from pathlib import Path
+
+import numpy as np
+
+from cdhr_host.drives.faults import fault
+from cdhr_host.errors import DriveError, Problem
+from cdhr_host.profile.schema import Profile
+from cdhr_host.values import Ints
+
+
+def default_store() -> Path:
+    """``$XDG_STATE_HOME/cdhr/references.json``."""
+    home = os.environ.get("XDG_STATE_HOME") or str(Path.home() / ".local" / "state")
+    return Path(home) / "cdhr" / "references.json"
+
+
+class ReferenceStore:
+    """Position units at the reference pose, kept in a file, one entry a drive."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def load(self) -> dict[str, int]:
+        """All entries; raises DriveError for a damaged file."""
+        try:
+            entries = json.loads(self._path.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return {}
+        except (OSError, ValueError) as error:
+            raise DriveError(
+                Problem(
+                    "reference", f"{self._path} cannot be used: {error}", hint="reference the drives again"
+                )
+            ) from error
+        if not isinstance(entries, dict) or not all(type(value) is int for value in entries.values()):
+            raise DriveError(Problem("reference", f"{self._path} is not a table of references"))
+        return entries
+
+    def save(self, profile: Profile, serials: list[int], position: Ints) -> None:
+        """Remember (6,) position units as the reference pose of these drives."""
+        entries = self.load()
+        entries |= {_key(profile, s): int(at) for s, at in zip(serials, position, strict=True)}
+        self._write(entries)
+
+    def forget(self, profile: Profile, serials: list[int]) -> None:
+        """These drives are unreferenced from now on."""
+        gone = {_key(profile, serial) for serial in serials}
+        self._write({key: value for key, value in self.load().items() if key not in gone})
+
+    def zero(self, profile: Profile, serials: list[int]) -> Ints:
+        """(6,) position units at the reference pose; raises DriveError with the drives that have none."""
+        entries = self.load()
+        absent = [k + 1 for k, serial in enumerate(serials) if _key(profile, serial) not in entries]
+        if absent:
+            raise unreferenced(absent)
+        return np.array([entries[_key(profile, serial)] for serial in serials], dtype=np.int64)
+
+    def _write(self, entries: dict[str, int]) -> None:
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        fresh = self._path.with_suffix(".new")
+        fresh.write_text(json.dumps(entries, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+        fresh.replace(self._path)
+
+
+def unreferenced(axes: list[int]) -> DriveError:
+    """Motion is refused; numbers from 1."""
+    names = ", ".join(map(str, axes))
+    return fault("unreferenced", f"not referenced: drive {names}; nothing may move")
+
+
+def _key(profile: Profile, serial: int) -> str:
+    return f"{profile.canopen.drive_vendor:08x}:{profile.canopen.drive_product:08x}:{serial}"
