@@ -34,7 +34,7 @@ class SmoothPath:
     end: float
     """m, where the last piece ends"""
     coefficients: Array
-    """(4, K, 3) q, q', q'', q''' at the start of each piece"""
+    """(4, 3, K) q, q', q'', q''' at the start of each piece"""
     segment: Ints
     """(K,) drawn segment each piece follows"""
     bending: Ints
@@ -46,23 +46,23 @@ class SmoothPath:
 
     def bounds(self) -> tuple[Array, Array]:
         """((K,), (K,)): greatest |q''| (1/m) and |q'''| (1/m²) within each piece."""
-        second = self.coefficients[2]
-        after = second + self.coefficients[3] * self.lengths()[:, None]
-        largest = np.maximum(_norm(second), _norm(after))
+        _, _, second, third = self.coefficients
+        after = second + third * self.lengths()
+        largest = np.maximum(_norm(second.T), _norm(after.T))
         bent = self.bending > 0
-        return np.where(bent, largest, 0.0), np.where(bent, _norm(self.coefficients[3]), 0.0)
+        return np.where(bent, largest, 0.0), np.where(bent, _norm(third.T), 0.0)
 
     def at(self, s: Array) -> tuple[Ints, Array, Array, Array]:
         """(N,) -> piece (N,), q, q', q'' (N, 3) each."""
         piece = np.clip(np.searchsorted(self.start, s, side="right") - 1, 0, len(self.start) - 1)
-        x = (s - self.start[piece])[:, None]
-        c0, c1, c2, c3 = self.coefficients[:, piece]
-        return (
-            piece,
-            c0 + x * (c1 + x * (c2 / 2 + x * (c3 / 6))),
-            c1 + x * (c2 + x * (c3 / 2)),
-            c2 + x * c3,
-        )
+        x = s - self.start[piece]
+        value, slope, bend = np.empty((3, 3, len(s)))
+        for k in range(3):
+            c0, c1, c2, c3 = (row[piece] for row in self.coefficients[:, k])
+            value[k] = c0 + x * (c1 + x * (c2 / 2 + x * (c3 / 6)))
+            slope[k] = c1 + x * (c2 + x * (c3 / 2))
+            bend[k] = c2 + x * c3
+        return piece, value.T, slope.T, bend.T
 
 
 def smooth(points: Array, h: float, *, opens: bool, closes: bool) -> SmoothPath:
@@ -87,7 +87,7 @@ def smooth(points: Array, h: float, *, opens: bool, closes: bool) -> SmoothPath:
     increments = slope * widths + second * widths**2 / 2 + third * widths**3 / 6
     value = points[0] - h * initial + _before(increments)
     segment = np.clip(np.searchsorted(drawn, knots, side="right") - 1, 0, len(lengths) - 1)
-    coefficients = np.stack((value, slope, second, third))
+    coefficients = np.stack([np.ascontiguousarray(rows.T) for rows in (value, slope, second, third)])
     return SmoothPath(knots, float(last), coefficients, segment, bending)
 
 

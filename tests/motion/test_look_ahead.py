@@ -41,7 +41,7 @@ def test_closed_form_distance_is_ruckigs(v0, v1):
 def test_reachable_speed_needs_exactly_the_length(v0, length, a, j):
     reached = reachable(v0, length, a, j)
     assert reached > v0
-    assert distance(v0, reached, a, j) == pytest.approx(length, rel=1e-5)
+    assert distance(v0, reached, a, j) == pytest.approx(length, rel=1e-6, abs=1e-9)
 
 
 def test_without_acceleration_the_speed_stays():
