@@ -7,6 +7,7 @@ q = position_G - cables.reference_G.
 from cdhr_host.mechanism import trajectories
 from cdhr_host.mechanism.bounds import direction_change_bound
 from cdhr_host.mechanism.cables import Cables, Loads
+from cdhr_host.mechanism.clearance import Clearance, clear_radius
 from cdhr_host.mechanism.consistency import inconsistencies
 from cdhr_host.mechanism.dynamics import (
     AffineTensions,
@@ -28,22 +29,37 @@ from cdhr_host.mechanism.pairs import (
     nine_tensions,
     shares,
 )
+from cdhr_host.mechanism.policy import POLICIES, Policy, PolicyName, UpperMotion
+from cdhr_host.mechanism.response import Response, Windows, response
 from cdhr_host.mechanism.state import cable_state
 from cdhr_host.mechanism.statics import tensions
 from cdhr_host.mechanism.stretch import Give, stretch_doubt, stretched_forward
+from cdhr_host.mechanism.workspace import Angles, Printable, Workspace, angles, printable
 
 __all__ = [
+    "POLICIES",
     "AffineTensions",
+    "Angles",
     "Cables",
+    "Clearance",
     "Give",
     "Loads",
     "Pairs",
+    "Policy",
+    "PolicyName",
+    "Printable",
+    "Response",
     "Shares",
+    "UpperMotion",
+    "Windows",
+    "Workspace",
     "accelerations",
     "affine_nine_tensions",
     "affine_tensions",
+    "angles",
     "bounded_shares",
     "cable_state",
+    "clear_radius",
     "condition",
     "direction_change_bound",
     "elastic_frequencies",
@@ -55,7 +71,9 @@ __all__ = [
     "model_errors",
     "moment_matrix",
     "nine_tensions",
+    "printable",
     "reachable",
+    "response",
     "shares",
     "slider",
     "stretch_doubt",
