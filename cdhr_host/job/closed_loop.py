@@ -61,11 +61,19 @@ class Truth:
 
     def __init__(self, period: float) -> None:
         self._period = period
+        self._start: float | None = None
         self.positions: list[tuple[float, float, float]] = [(0.0, 0.0, 0.0)]
+
+    def add(self, t: float, position: tuple[float, float, float]) -> None:
+        """Where it was at the end of the tick of time ``t``; ticks come one after the other."""
+        if self._start is None:
+            self._start = t - self._period
+        self.positions.append(position)
 
     def __call__(self, t: float) -> Array:
         """Times before the start or beyond the last tick give the first or last position."""
-        place = min(max(t / self._period, 0.0), len(self.positions) - 1.0)
+        start = 0.0 if self._start is None else self._start
+        place = min(max((t - start) / self._period, 0.0), len(self.positions) - 1.0)
         before = int(place)
         after = min(before + 1, len(self.positions) - 1)
         a, b = np.array(self.positions[before]), np.array(self.positions[after])
@@ -107,7 +115,7 @@ class OuterLoop:
         self._state, action = self._controller.step(self._state, plan, seen, self._period)
         commanded = shifted(self._cables, plan.position[None], action)[0]
         self._rig_state = self._rig.step(self._rig_state, commanded.tolist())
-        self.truth.positions.append(self._rig_state.bodies.lower)
+        self.truth.add(plan.t, self._rig_state.bodies.lower)
         return commanded, action
 
 
@@ -137,7 +145,7 @@ class ForceLoop:
         action = Action(Mode.CLOSED)
         for n in range(INNER_STEPS):
             action = self._inner(_ahead(plan, n * dt), dt)
-        self.truth.positions.append(self._body.lower)
+        self.truth.add(plan.t, self._body.lower)
         return np.array(self._run), action
 
     def _inner(self, plan: Plan, dt: float) -> Action:
