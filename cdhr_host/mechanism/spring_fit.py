@@ -32,6 +32,8 @@ NEAR: Final = 0.06
 """a margin this far below zero counts as beyond what is possible"""
 START: Final = 1.5
 """spring force to begin with, of the middle of the lower window"""
+PIECE: Final = 6
+"""poses of a product done at once"""
 DAMPINGS: Final = 8
 """tries of a Newton step, each damped six times as much"""
 
@@ -71,15 +73,14 @@ class _Fit:
         """One damped Newton step; the same coefficients where none gets better."""
         value, slope, curve = self.worst(coefficients, sharpness)
         gradient = np.einsum("nkm,nk->m", self.basis, self.weight[:, None] * slope)
-        root = np.linalg.cholesky(curve + 1e-7 * np.eye(3)).transpose(0, 2, 1)
-        rows = (np.sqrt(self.weight)[:, None, None] * (root @ self.basis)).reshape(-1, len(coefficients))
-        hessian = rows.T @ rows
+        curve += 1e-7 * np.eye(3)
+        hessian = _product(self.weight[:, None, None] * (curve @ self.basis), self.basis)
         scale = float(np.diag(hessian).mean()) * np.eye(len(coefficients))
         for _ in range(DAMPINGS):
-            trial = coefficients - np.linalg.solve(hessian + self.damping * scale, gradient)
+            trial = coefficients - _solved(hessian + self.damping * scale, gradient)
             if self.worst(trial, sharpness)[0] < value:
                 self.damping = max(self.damping / 6.0, 1e-7)
-                return np.asarray(trial, dtype=np.float64)
+                return trial
             self.damping *= 6.0
         return coefficients
 
@@ -103,6 +104,29 @@ def best_field(cables: Cables, loads: Loads, pairs: Pairs, windows: Windows, row
         fit.weight = _importance(windows.margins(fit.response.force(spring)).min(axis=1))
     full[used] = coefficients
     return SpringField(domain, full.reshape(ROWS, RISE + 1))
+
+
+def _product(left: Array, right: Array) -> Array:
+    """(N, 3, M) twice -> (M, M): the sum of leftᵀ right, in pieces small enough to stay on one core.
+
+    A library that spreads the product over all cores is slower wherever these have other work.
+    """
+    size = left.shape[2]
+    pieces = np.zeros((2, -(-left.shape[0] // PIECE) * PIECE, 3, size))
+    pieces[0, : len(left)], pieces[1, : len(left)] = left, right
+    first, second = pieces.reshape(2, -1, 3 * PIECE, size)
+    return np.asarray((first.transpose(0, 2, 1) @ second).sum(axis=0), dtype=np.float64)
+
+
+def _solved(matrix: Array, vector: Array) -> Array:
+    """matrix⁻¹ vector of a positive definite matrix by elimination, on one core like ``_product``."""
+    work = np.column_stack([matrix, vector])
+    for k in range(len(vector) - 1):
+        work[k + 1 :, k:] -= np.multiply.outer(work[k + 1 :, k] / work[k, k], work[k, k:])
+    found = np.zeros_like(vector)
+    for k in reversed(range(len(vector))):
+        found[k] = (work[k, -1] - (work[k, k:-1] * found[k:]).sum()) / work[k, k]
+    return found
 
 
 def whole_machine(cables: Cables) -> Domain:
