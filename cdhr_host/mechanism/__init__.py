@@ -5,7 +5,7 @@ q = position_G - cables.reference_G.
 """
 
 from cdhr_host.mechanism import trajectories
-from cdhr_host.mechanism.bounds import direction_change_bound
+from cdhr_host.mechanism.bounds import UpperBounds, direction_change_bound, upper_bounds
 from cdhr_host.mechanism.cables import Cables, Loads
 from cdhr_host.mechanism.clearance import Clearance, clear_radius
 from cdhr_host.mechanism.consistency import inconsistencies
@@ -34,6 +34,7 @@ from cdhr_host.mechanism.response import Response, Windows, response
 from cdhr_host.mechanism.state import cable_state
 from cdhr_host.mechanism.statics import tensions
 from cdhr_host.mechanism.stretch import Give, stretch_doubt, stretched_forward
+from cdhr_host.mechanism.transition import transition
 from cdhr_host.mechanism.workspace import Angles, Printable, Workspace, angles, printable
 
 __all__ = [
@@ -50,6 +51,7 @@ __all__ = [
     "Printable",
     "Response",
     "Shares",
+    "UpperBounds",
     "UpperMotion",
     "Windows",
     "Workspace",
@@ -83,6 +85,8 @@ __all__ = [
     "tension_stiffness",
     "tensions",
     "trajectories",
+    "transition",
     "uncompensated_error",
     "uncompensated_lengths",
+    "upper_bounds",
 ]
