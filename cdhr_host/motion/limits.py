@@ -11,7 +11,7 @@ that the nozzle's limits hold whatever the time law does inside them: a straight
 the whole budget to s'' and s'''; a bent one keeps most of it for the bend.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,7 +34,7 @@ NEWTON_STEPS = 6
 MERGE = 0.1
 """m, cells are merged up to this length, so that a long path has borders to stop at."""
 CHORD_ERROR = 1e-6
-"""m, how far the chords that stand for an arc may be from it."""
+"""m, how far the chords that stand for a curve may be from it."""
 
 
 def _too_slow_sliders(speed: float) -> Problem:
@@ -77,9 +77,16 @@ class MotionLimits:
         j = min(limits.jerk_max, sliders.jerk_max - 3 * bend * v * a - 6 * bend**2 * v**3)
         if a <= 0.0 or j <= 0.0:
             raise MotionError(_too_slow_sliders(v))
-        # The kernel deviates by a third of its half-width; a micrometre is left for arcs' chords.
-        h = 3.0 * (profile.path.tolerance - CHORD_ERROR)
-        return cls(v, a, j, h, profile.path.stop_angle)
+        return cls(v, a, j, half_width(profile.path.tolerance), profile.path.stop_angle)
+
+    def within(self, tolerance: float) -> "MotionLimits":
+        """The same limits with the smoothing that a tolerance (m) allows."""
+        return replace(self, half_width=half_width(tolerance))
+
+
+def half_width(tolerance: float) -> float:
+    """m -> m: the kernel deviates by a third of its half-width; CHORD_ERROR is left for curves' chords."""
+    return 3.0 * (tolerance - CHORD_ERROR)
 
 
 @dataclass(frozen=True, slots=True)

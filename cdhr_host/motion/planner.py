@@ -2,15 +2,31 @@
 
 import math
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from functools import singledispatchmethod
 
 import numpy as np
 
 from cdhr_host.motion.arc import chords
-from cdhr_host.motion.leg import LegPlanner, Segments
+from cdhr_host.motion.curves import points_on
+from cdhr_host.motion.leg import BATCH, LegPlanner, Segments
 from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.sampling import Stand, Stretch, Timeline
-from cdhr_host.values import Arc, Array, Command, Dwell, Ints, Moves, Notice, Pause, Prime, Stop, ToolTrack
+from cdhr_host.values import (
+    Arc,
+    Array,
+    Blend,
+    Command,
+    Dwell,
+    Flags,
+    Moves,
+    Notice,
+    Pause,
+    Prime,
+    Spline,
+    Stop,
+    ToolTrack,
+)
 
 
 class Planner:
@@ -21,7 +37,8 @@ class Planner:
     """
 
     def __init__(self, limits: MotionLimits, at_G: Array) -> None:
-        self._limits = limits
+        self._usual = self._limits = limits
+        self._exact = False
         self._leg = LegPlanner(limits)
         self._direction: Array | None = None
         self._at = np.array(at_G, dtype=float)
@@ -31,6 +48,12 @@ class Planner:
     def standing(self) -> Stand:
         """Where the nozzle stands after ``close``, for no time."""
         return Stand(self._at, 0.0, 0.0, self._line)
+
+    def moved_to(self, at_G: Array) -> "Planner":
+        """A planner that takes corners as this one does, at rest in (3,) m, with nothing drawn."""
+        moved = Planner(self._usual, at_G)
+        moved._blend(self._limits, exact=self._exact)
+        return moved
 
     def stretches(self, command: Command) -> Iterator[Stretch]:
         """Stretches that a further command settles."""
@@ -51,15 +74,34 @@ class Planner:
     @_take.register
     def _(self, command: Moves) -> Iterator[Stretch]:
         points = np.concatenate((command.start_G[None], command.end_G))
-        return self._draw(points, command.line, command.speed, command.clay, command.air)
+        steps = np.diff(points, axis=0)
+        length = np.sqrt(np.einsum("nk,nk->n", steps, steps))
+        keep = length > 0.0
+        if not keep.any():
+            return iter(())
+        drawn = Segments(
+            np.concatenate((points[:1], points[1:][keep])),
+            command.line[keep],
+            command.speed[keep],
+            command.clay[keep] / length[keep],
+            command.air[keep],
+        )
+        return self._draw(drawn, np.full(len(drawn), self._exact))
 
     @_take.register
     def _(self, command: Arc) -> Iterator[Stretch]:
-        points = np.concatenate((command.start_G[None], chords(command, self._limits.half_width)))
-        same = np.ones(len(points) - 1)
-        clay = same * command.clay / len(same)
-        line = np.full(len(same), command.line)
-        return self._draw(points, line, same * command.speed, clay, same * command.air)
+        return self._curve(command, chords(command, self._limits.half_width))
+
+    @_take.register
+    def _(self, command: Spline) -> Iterator[Stretch]:
+        return self._curve(command, points_on(command, self._limits.half_width))
+
+    @_take.register
+    def _(self, command: Blend) -> Iterator[Stretch]:
+        limits = self._usual if command.tolerance is None else self._usual.within(command.tolerance)
+        if limits != self._limits or command.exact != self._exact:
+            yield from self.close()
+            self._blend(limits, exact=command.exact)
 
     @_take.register
     def _(self, command: Dwell) -> Iterator[Stretch]:
@@ -77,19 +119,36 @@ class Planner:
     def _(self, _: Notice) -> Iterator[Stretch]:
         return iter(())
 
-    def _draw(self, points: Array, line: Ints, speed: Array, clay: Array, air: Array) -> Iterator[Stretch]:
-        """Add segments to the leg; close it where a corner is too sharp."""
+    def _blend(self, limits: MotionLimits, *, exact: bool) -> None:
+        """Take corners so from here on; the nozzle is at rest."""
+        self._limits, self._exact = limits, exact
+        self._leg = LegPlanner(limits)
+
+    def _curve(self, command: Arc | Spline, points: Array) -> Iterator[Stretch]:
+        """Draw a curve through (M + 1, 3) m; clay is even along it."""
         steps = np.diff(points, axis=0)
         length = np.sqrt(np.einsum("nk,nk->n", steps, steps))
-        keep = length > 0.0
-        if not keep.any():
-            return
-        direction = steps[keep] / length[keep, None]
-        points = np.concatenate((points[:1], points[1:][keep]))
-        feed = np.minimum(speed[keep], self._limits.speed)
-        drawn = Segments(points, line[keep], feed, clay[keep] / length[keep], air[keep])
+        points = np.concatenate((points[:1], points[1:][length > 0.0]))
+        count, whole = len(points) - 1, float(length.sum())
+        for first in range(0, count, BATCH):
+            part = points[first : first + BATCH + 1]
+            same = np.ones(len(part) - 1)
+            line = np.full(len(same), command.line)
+            drawn = Segments(
+                part, line, same * command.speed, same * command.clay / whole, same * command.air
+            )
+            stops = np.zeros(len(same), dtype=np.bool_)
+            stops[0] = self._exact and first == 0
+            yield from self._draw(drawn, stops)
+
+    def _draw(self, drawn: Segments, stops: Flags) -> Iterator[Stretch]:
+        """Add segments to the leg; close it before those in ``stops`` (M,) and before sharp corners."""
+        drawn = replace(drawn, feed=np.minimum(drawn.feed, self._limits.speed))
+        steps = np.diff(drawn.points, axis=0)
+        direction = steps / np.sqrt(np.einsum("nk,nk->n", steps, steps))[:, None]
+        stops = stops | self._sharp(direction)
         first = 0
-        for corner in [*self._sharp(direction), len(drawn)]:
+        for corner in [*np.flatnonzero(stops).tolist(), len(drawn)]:
             if corner > first:
                 self._leg.add(drawn.part(first, corner))
             if corner < len(drawn):
@@ -98,15 +157,14 @@ class Planner:
                 yield leg
             first = corner
         self._direction = direction[-1]
-        self._at, self._line = points[-1], int(line[-1])
+        self._at, self._line = drawn.points[-1], int(drawn.line[-1])
 
-    def _sharp(self, direction: Array) -> list[int]:
-        """Segments that begin with a corner sharper than the stop angle."""
+    def _sharp(self, direction: Array) -> Flags:
+        """(M,) whether a segment begins with a corner sharper than the stop angle."""
         before = direction[:1] if self._direction is None else self._direction[None]
         cosine = np.einsum("nk,nk->n", np.concatenate((before, direction[:-1])), direction)
-        sharp = cosine < math.cos(self._limits.stop_angle)
-        found: list[int] = np.flatnonzero(sharp).tolist()
-        return found
+        sharp: Flags = cosine < math.cos(self._limits.stop_angle)
+        return sharp
 
     def _stand(self, duration: float, flow: float, line: int) -> Iterator[Stretch]:
         yield from self.close()

@@ -1,6 +1,5 @@
 """The whole file walked once without drives: time, extremes, and everything it cannot do."""
 
-import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import singledispatchmethod
@@ -8,12 +7,26 @@ from functools import singledispatchmethod
 import numpy as np
 
 from cdhr_host.errors import MAX_LISTED, Problem
+from cdhr_host.motion.arc import arc_length
+from cdhr_host.motion.curves import spline_length
 from cdhr_host.motion.sampling import Timed
 from cdhr_host.pipeline.columns import setpoint_columns
 from cdhr_host.pipeline.staircase import Checked, Staircase
 from cdhr_host.pipeline.survey import Survey
 from cdhr_host.profile import Profile
-from cdhr_host.values import Arc, Command, Dwell, Moves, Notice, Pause, Prime, Setpoints, Stop
+from cdhr_host.values import (
+    Arc,
+    Blend,
+    Command,
+    Dwell,
+    Moves,
+    Notice,
+    Pause,
+    Prime,
+    Setpoints,
+    Spline,
+    Stop,
+)
 
 Extreme = tuple[float, int, float, int]
 """least, its line, greatest, its line"""
@@ -128,9 +141,14 @@ class _Tally:
 
     @command.register
     def _(self, command: Arc) -> None:
-        radius = math.dist(command.start_G[:2].tolist(), command.centre_G.tolist())
         self.moves += 1
-        self.path += math.hypot(radius * command.sweep, float(command.end_G[2] - command.start_G[2]))
+        self.path += arc_length(command)
+        self.extruded += command.clay
+
+    @command.register
+    def _(self, command: Spline) -> None:
+        self.moves += 1
+        self.path += spline_length(command)
         self.extruded += command.clay
 
     @command.register
@@ -149,8 +167,8 @@ class _Tally:
     def _(self, _: Pause) -> None:
         self.pauses += 1
 
-    @command.register(Dwell | Stop)
-    def _(self, _: Dwell | Stop) -> None:
+    @command.register(Dwell | Stop | Blend)
+    def _(self, _: Dwell | Stop | Blend) -> None:
         """Adds nothing of its own; its time is in the setpoints."""
 
     def proof(self, lines: int) -> Proof:

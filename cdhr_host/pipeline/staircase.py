@@ -57,8 +57,8 @@ class Staircase:
     def stand_at(self, at_G: Array) -> None:
         """The machine was stopped on its way and stands at (3,) m; modal state stays otherwise."""
         x, y, z = at_G.tolist()
-        self._planner, self._timeline = Planner(self._limits, at_G), Timeline(self._period)
-        self._interpreter.modal = replace(self._interpreter.modal, position=(x, y, z))
+        self._planner, self._timeline = self._planner.moved_to(at_G), Timeline(self._period)
+        self._interpreter.modal = replace(self._interpreter.modal, position=(x, y, z), onward=None)
 
     def timed(self, chunks: Iterable[bytes]) -> Iterator[Command | Timed]:
         """Each command of a text, after the stretches it settles; ends at rest.

@@ -1,4 +1,4 @@
-"""Arcs and helices in the XY plane (G2, G3), by centre (I J) or by radius (R).
+"""Arcs and helices in the plane of G17, G18 or G19 (G2, G3), by centre (I J K) or by radius (R).
 
 The centre is exact for the start, the end is the programmed one, and the sweep is the angle
 between them seen from the centre; where the two radii differ by the rounding of the file the
@@ -14,11 +14,12 @@ import numpy as np
 
 from cdhr_host.errors import Problem
 from cdhr_host.program.block import Block
-from cdhr_host.program.modal import GRID_DIGITS, Modal
+from cdhr_host.program.modal import GRID_DIGITS, Modal, Point, Point2
 from cdhr_host.program.run import Run, missing_feed
-from cdhr_host.program.straight import row_of
+from cdhr_host.program.settings import PLANES
+from cdhr_host.program.straight import LONGEST, reach, row_of
 from cdhr_host.units import MM
-from cdhr_host.values import Arc
+from cdhr_host.values import Arc, Plane
 
 RADIUS_TOLERANCE: Final = 0.05 * MM
 """m by which the radii at start and end may differ"""
@@ -26,8 +27,8 @@ RADIUS_TOLERANCE_SHARE: Final = 1e-3
 """of the radius, where that is more"""
 FULL_TURN_ANGLE: Final = 5e-7
 """rad; a smaller sweep is a full turn"""
-
-Point2 = tuple[float, float]
+PARTS: Final = 360
+"""Chords that say what an arc of clay comes near to"""
 
 
 class _NoArcError(Exception):
@@ -43,29 +44,37 @@ class _NoArcError(Exception):
 
 
 def arc(run: Run, block: Block) -> None:
-    """G2 (clockwise) and G3."""
+    """G2 (clockwise) and G3, in the plane of G17, G18 or G19."""
     if run.unfed and "F" not in block:
         run.refuse(missing_feed(block.line, block.column))
     run.unfed = False
     digits = {word.letter: word.digits for word in block.words}
     steps, speed = run.step(row_of("G1", digits), block.line)
     before, end = run.modal.position, steps.modal.position
+    plane = run.modal.plane
+    start2, end2 = _seen(plane, before), _seen(plane, end)
     try:
-        centre = _centre(block, run.modal, before, end)
+        centre = _centre(block, run.modal, start2, end2)
+        sweep = _sweep(start2, end2, centre, clockwise=block.code == "G2")
+        _check_length(math.dist(start2, centre) * abs(sweep))
     except _NoArcError as refused:
         if refused.value is None or not run.lost:
             run.refuse(_problem(block, refused))
         run.modal = steps.modal
         return
-    sweep = _sweep(before, end, centre, clockwise=block.code == "G2")
     clay, air = float(steps.clay[0]), run.modal.air
     run.modal = steps.modal
+    made = Arc(block.line, np.array(before), np.array(end), np.array(centre), sweep, speed, clay, air, plane)
     if clay > 0.0 or air > 0.0:
-        near = min(run.modal.near, _axis_distance(before, end, centre, sweep))
-        run.modal = replace(run.modal, top=max(run.modal.top, before[2], end[2]), near=near)
-    run.emit(
-        Arc(block.line, np.array(before), np.array(end), np.array(centre), sweep, speed, clay, air),
-    )
+        top, near = _reach(made)
+        run.modal = replace(run.modal, top=max(run.modal.top, top), near=min(run.modal.near, near))
+    run.emit(made)
+
+
+def _seen(plane: Plane, point: Point) -> Point2:
+    """A point on the two axes of a plane."""
+    first, second, _ = plane.value
+    return point[first], point[second]
 
 
 def _problem(block: Block, refused: _NoArcError) -> Problem:
@@ -81,20 +90,29 @@ def _problem(block: Block, refused: _NoArcError) -> Problem:
     )
 
 
-def _centre(block: Block, modal: Modal, start: tuple[float, ...], end: tuple[float, ...]) -> Point2:
+def _centre(block: Block, modal: Modal, start: Point2, end: Point2) -> Point2:
     """m; raises _NoArcError when there is none."""
-    by_offset = "I" in block or "J" in block
+    first, second, along = modal.plane.value
+    letters = "IJK"[first], "IJK"[second]
+    names = " ".join(sorted(letters))
+    if "IJK"[along] in block:
+        code = next(code for code, plane in PLANES.items() if plane is modal.plane)
+        raise _NoArcError(
+            f"{block.code} has no word {'IJK'[along]} in the plane of {code}", f"the centre is {names} there"
+        )
+    by_offset = letters[0] in block or letters[1] in block
     if by_offset and "R" in block:
-        raise _NoArcError(f"{block.code} has both a centre (I J) and a radius (R)", "give one of them")
+        raise _NoArcError(f"{block.code} has both a centre ({names}) and a radius (R)", "give one of them")
     if "R" in block:
         return _centre_by_radius(block, modal, start, end)
     if not by_offset:
-        raise _NoArcError(f"{block.code} has no centre", "give I and J, from the start to the centre, or R")
+        hint = f"give {' and '.join(sorted(letters))}, from the start to the centre, or R"
+        raise _NoArcError(f"{block.code} has no centre", hint)
     centre = (
-        round(start[0] + block.get("I") * modal.unit, GRID_DIGITS),
-        round(start[1] + block.get("J") * modal.unit, GRID_DIGITS),
+        round(start[0] + block.get(letters[0]) * modal.unit, GRID_DIGITS),
+        round(start[1] + block.get(letters[1]) * modal.unit, GRID_DIGITS),
     )
-    _check_radii(math.dist(start[:2], centre), math.dist(end[:2], centre))
+    _check_radii(math.dist(start, centre), math.dist(end, centre))
     return centre
 
 
@@ -115,7 +133,14 @@ def _check_radii(at_start: float, at_end: float) -> None:
         )
 
 
-def _centre_by_radius(block: Block, modal: Modal, start: tuple[float, ...], end: tuple[float, ...]) -> Point2:
+def _check_length(length: float) -> None:
+    if length > LONGEST:
+        raise _NoArcError(
+            f"the arc is {length:.4g} m long", f"arcs may be {LONGEST:g} m long; is the centre right?"
+        )
+
+
+def _centre_by_radius(block: Block, modal: Modal, start: Point2, end: Point2) -> Point2:
     """R > 0 is the arc of up to half a turn, R < 0 the longer one."""
     radius = block.get("R") * modal.unit
     dx, dy = end[0] - start[0], end[1] - start[1]
@@ -135,24 +160,30 @@ def _centre_by_radius(block: Block, modal: Modal, start: tuple[float, ...], end:
     return (start[0] + dx / 2 - side * dy / chord, start[1] + dy / 2 + side * dx / chord)
 
 
-def _sweep(start: tuple[float, ...], end: tuple[float, ...], centre: Point2, *, clockwise: bool) -> float:
+def _sweep(start: Point2, end: Point2, centre: Point2, *, clockwise: bool) -> float:
     """rad, negative when clockwise."""
     angle = math.atan2(end[1] - centre[1], end[0] - centre[0])
     angle -= math.atan2(start[1] - centre[1], start[0] - centre[0])
     turn = (-angle if clockwise else angle) % math.tau
-    if turn <= FULL_TURN_ANGLE or math.dist(start[:2], end[:2]) == 0.0:
+    if turn <= FULL_TURN_ANGLE or start == end:
         turn = math.tau
     return -turn if clockwise else turn
 
 
-def _axis_distance(start: tuple[float, ...], end: tuple[float, ...], centre: Point2, sweep: float) -> float:
-    """m from the reference axis (x = y = 0) to the arc, or a little less."""
-    to_axis = math.atan2(-centre[1], -centre[0])
-    first = math.atan2(start[1] - centre[1], start[0] - centre[0])
-    ahead = (math.copysign(1.0, sweep) * (to_axis - first)) % math.tau
-    nearest = min(math.hypot(*start[:2]), math.hypot(*end[:2]))
-    if ahead > abs(sweep):
-        return nearest
-    middle = math.hypot(*centre)
-    radii = (math.dist(start[:2], centre), math.dist(end[:2], centre))
-    return min(nearest, *(abs(middle - radius) for radius in radii))
+def _reach(made: Arc) -> tuple[float, float]:
+    """m: a height that the arc does not pass, and a distance to the reference axis that it keeps.
+
+    Worked out from PARTS chords, whose sagitta is added and taken off.
+    """
+    first, second, along = made.plane.value
+    start, end = (np.array(_seen(made.plane, tuple(at.tolist()))) for at in (made.start_G, made.end_G))
+    radii = [math.dist(at, made.centre_G) for at in (start, end)]
+    u = np.arange(PARTS + 1) / PARTS
+    angle = math.atan2(*(start - made.centre_G)[::-1]) + made.sweep * u
+    radius = radii[0] + (radii[1] - radii[0]) * u
+    points = np.empty((PARTS + 1, 3))
+    points[:, first] = made.centre_G[0] + radius * np.cos(angle)
+    points[:, second] = made.centre_G[1] + radius * np.sin(angle)
+    points[:, along] = made.start_G[along] + (made.end_G[along] - made.start_G[along]) * u
+    sagitta = max(radii) * (1.0 - math.cos(made.sweep / PARTS / 2))
+    return reach(points, 0.0 if made.plane is Plane.XY else sagitta, sagitta)

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from typing import Final
 
 from cdhr_host.units import MM, MM3
+from cdhr_host.values import Plane
 
 Point = tuple[float, float, float]
+Point2 = tuple[float, float]
 
 GRID_DIGITS: Final = 12
 """Positions are kept on a grid of one picometre, so that the rounding left by G91 and G92
@@ -49,6 +51,10 @@ class Modal:
     """X Y Z (G90, G91)"""
     absolute_e: bool = True
     """E (M82, M83)"""
+    plane: Plane = Plane.XY
+    """of arcs (G17, G18, G19)"""
+    onward: Point2 | None = None
+    """m, x and y of the first control offset that goes on from the last G5; None after other moves"""
     feed: float | None = None
     """m/s, None before the first F"""
     volumetric: bool = False

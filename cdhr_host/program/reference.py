@@ -35,7 +35,7 @@ def reference(run: Run, block: Block) -> None:
     x, y, _ = modal.position
     way = [(x, y, height), (0.0, 0.0, height)] + ([] if blocked else [(0.0, 0.0, 0.0)])
     _travel(run, block.line, way)
-    run.modal = replace(run.modal, position=way[-1], offset=(0.0, 0.0, 0.0))
+    run.modal = replace(run.modal, position=way[-1], offset=(0.0, 0.0, 0.0), onward=None)
     run.lost = False
 
 

@@ -69,7 +69,7 @@ class Run:
         steps = resolve(self.modal, [row])
         speed = float(steps.feed[0]) * self.modal.speed_factor
         self._warn_fast(line, speed)
-        return steps, speed
+        return replace(steps, modal=replace(steps.modal, warned=self.modal.warned)), speed
 
     def refuse_word(self, block: Block, letter: str, message: str, limit: str, hint: str) -> None:
         """Note a number that is out of its range."""

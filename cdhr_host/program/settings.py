@@ -6,9 +6,14 @@ from cdhr_host.program.block import Block
 from cdhr_host.program.modal import GRID_DIGITS
 from cdhr_host.program.run import Run
 from cdhr_host.units import INCH, MM
+from cdhr_host.values import Blend, Plane
 
 FACTOR_LIMITS = (1.0, 300.0)
 """percent, what M220 and M221 may be set to"""
+
+TOLERANCE_LIMITS = (0.01, 50.0)
+"""mm, what G64 P may be set to"""
+PLANES = {"G17": Plane.XY, "G18": Plane.ZX, "G19": Plane.YZ}
 
 
 def units(run: Run, block: Block) -> None:
@@ -23,6 +28,32 @@ def distances(run: Run, block: Block) -> None:
     """G90, G91: X Y Z only."""
     run.flush()
     run.modal = replace(run.modal, absolute=block.code == "G90")
+
+
+def plane(run: Run, block: Block) -> None:
+    """G17, G18, G19."""
+    run.flush()
+    run.modal = replace(run.modal, plane=PLANES[block.code])
+
+
+def exact(run: Run, block: Block) -> None:
+    """G61, G61.1: both stop at the end of every move."""
+    run.emit(Blend(block.line, None, exact=True))
+
+
+def blend(run: Run, block: Block) -> None:
+    """G64: corners are taken within P, or within the profile's tolerance when it is alone."""
+    if "P" not in block:
+        run.emit(Blend(block.line, None, exact=False))
+        return
+    tolerance = block.get("P") * run.modal.unit
+    least, most = TOLERANCE_LIMITS
+    if least <= tolerance / MM <= most:
+        run.emit(Blend(block.line, tolerance, exact=False))
+        return
+    message = f"G64 P{block.get('P'):g} is outside {least:g} to {most:g} mm"
+    hint = "P is how far the nozzle may leave the drawn path; G61 stops at the end of every move"
+    run.refuse_word(block, "P", message, f"{least:g}..{most:g}", hint)
 
 
 def e_distances(run: Run, block: Block) -> None:

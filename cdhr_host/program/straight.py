@@ -19,6 +19,8 @@ from cdhr_host.values import Array, Command, Ints, Moves, Prime
 
 BATCH: Final = 1024
 """Greatest number of rows taken together."""
+LONGEST: Final = 100.0
+"""m of arc or curve; nothing that long is meant."""
 
 Row = tuple[str, ...]
 
@@ -71,6 +73,7 @@ def resolve(modal: Modal, rows: Sequence[Row]) -> Steps:
     after = replace(
         modal,
         position=tuple(points[-1].tolist()),
+        onward=None,
         feed=None if math.isnan(last) else last,
         e=e_after,
         debt=debt,
@@ -186,3 +189,12 @@ def axis_distance(starts: Array, ends: Array) -> Array:
     square = np.maximum((along**2).sum(axis=1), np.finfo(np.float64).tiny)
     share = np.clip(-(starts * along).sum(axis=1) / square, 0.0, 1.0)
     return np.asarray(np.hypot(*(starts + share[:, None] * along).T))
+
+
+def reach(points: Array, above: float, beside: float) -> tuple[float, float]:
+    """(M + 1, 3) m of a curve's chords -> m: its top, and its distance to the reference axis.
+
+    The curve may be ``above`` its chords by so many metres, and ``beside`` them by so many.
+    """
+    near = float(axis_distance(points[:-1, :2], points[1:, :2]).min())
+    return float(points[:, 2].max()) + above, max(near - beside, 0.0)

@@ -6,6 +6,9 @@ The dialect is RepRap's as Marlin speaks it, with these choices:
   greatest speed; G1 before any F is refused. F is shared by G0 and G1 and may exceed the
   machine's speed: the planner is slower then, and one warning says so.
 * G90 and G91 are for X Y Z; E follows M82 and M83 only.
+* Arcs lie in the plane of G17, G18 or G19 and go clockwise as seen from its normal's positive
+  end; I J K count from the start. Curves (G5, G5.1) are LinuxCNC's, with E and F.
+* G61 and G61.1 are the same, an exact stop at the end of every move; a program starts in G64.
 * Clay never goes back: negative E is a debt that later E pays first; the excess is clay.
 * G4 P is in ms and S in s; G92 never moves the machine's limits; G28 is the machine as a whole.
 * Air words hold a pressure along the moves that follow, whatever the speed; [air] says which.
@@ -24,6 +27,7 @@ from cdhr_host.program.arc import arc
 from cdhr_host.program.block import Block
 from cdhr_host.program.reference import reference
 from cdhr_host.program.run import Run
+from cdhr_host.program.spline import cubic, quadratic
 from cdhr_host.program.straight import row_of
 
 
@@ -55,15 +59,33 @@ _TABLE: Final = (
     KnownWord(
         "G1", "XYZEF", "straight move; with E alone clay is pushed at rest, F being its rate", straight
     ),
-    KnownWord("G2", "XYZIJREF", "clockwise arc or helix by centre (I J from the start) or radius R", arc),
-    KnownWord("G3", "XYZIJREF", "counter-clockwise arc or helix", arc),
+    KnownWord("G2", "XYZIJKREF", "clockwise arc or helix by centre (I J K from the start) or radius R", arc),
+    KnownWord("G3", "XYZIJKREF", "counter-clockwise arc or helix", arc),
     KnownWord("G4", "PS", "stand still, air off: P in ms, S in s; without a time an exact stop", waits.dwell),
+    KnownWord(
+        "G5",
+        "XYZIJPQEF",
+        "cubic curve in XY: I J from the start to the first control point, P Q from the end to the second",
+        cubic,
+        needs="PQ",
+    ),
+    KnownWord("G5.1", "XYZIJEF", "quadratic curve in XY: I J from the start to the control point", quadratic),
     KnownWord("G10", "", "firmware retraction: no motion here", waits.nothing),
     KnownWord("G11", "", "end of firmware retraction: no motion here", waits.nothing),
-    KnownWord("G17", "", "arcs lie in the XY plane, as always", waits.nothing),
+    KnownWord("G17", "", "arcs lie in the XY plane (default), Z is the helix", settings.plane),
+    KnownWord("G18", "", "arcs lie in the ZX plane (I K), Y is the helix", settings.plane),
+    KnownWord("G19", "", "arcs lie in the YZ plane (J K), X is the helix", settings.plane),
     KnownWord("G20", "", "numbers are inches (E cubic inches when it is a volume)", settings.units),
     KnownWord("G21", "", "numbers are millimetres (default)", settings.units),
     KnownWord("G28", "XYZWO", "to the reference pose as a whole, above the print", reference, bare=True),
+    KnownWord("G61", "", "exact stop at the end of every move, until G64", settings.exact),
+    KnownWord("G61.1", "", "like G61", settings.exact),
+    KnownWord(
+        "G64",
+        "P",
+        "corners within P (0.01 to 50 mm) of the path; alone the profile's (default)",
+        settings.blend,
+    ),
     KnownWord("G90", "", "X Y Z are absolute (default); E follows M82 and M83 only", settings.distances),
     KnownWord("G91", "", "X Y Z are relative", settings.distances),
     KnownWord("G92", "XYZE", "the present position gets these numbers; alone, zeros", settings.offsets),
@@ -112,8 +134,8 @@ _TABLE: Final = (
 WORDS: Final[dict[str, KnownWord]] = {row.code: row for row in _TABLE}
 
 _REASONS: Final = {
-    "G18": "only G17 is supported so far: arcs lie in the XY plane",
-    "G19": "only G17 is supported so far: arcs lie in the XY plane",
+    "G5.2": "of the curves only G5 and G5.1 are there: write NURBS as cubics (G5)",
+    "G5.3": "of the curves only G5 and G5.1 are there: write NURBS as cubics (G5)",
     "G41": "there is no cutter to compensate: let the slicer offset the path",
     "G42": "there is no cutter to compensate: let the slicer offset the path",
     "G43": "there is one nozzle and no tool length: use G92 Z",

@@ -9,7 +9,7 @@ import numpy as np
 from cdhr_host.errors import Problem, ProgramError
 from cdhr_host.profile import Profile, read_table, validate
 from cdhr_host.program import Interpreter
-from cdhr_host.values import Arc, Command, Dwell, Moves, Notice, Pause, Prime, Stop
+from cdhr_host.values import Arc, Blend, Command, Dwell, Moves, Notice, Pause, Plane, Prime, Spline, Stop
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -109,7 +109,17 @@ def _shown(command: Command) -> list[str]:
                 f"{command.line} arc to {_point(command.end_G)} about {_point(command.centre_G)} "
                 f"by {_plain(np.degrees(command.sweep))} deg at {_plain(command.speed * 1e3)}"
                 f"{_load(command.clay, command.air)}"
+                f"{'' if command.plane is Plane.XY else f' in {command.plane.name}'}"
             ]
+        case Spline():
+            _, first, second, end = command.control_G
+            return [
+                f"{command.line} curve by {_point(first[:2])} and {_point(second[:2])} to {_point(end)} "
+                f"at {_plain(command.speed * 1e3)}{_load(command.clay, command.air)}"
+            ]
+        case Blend():
+            within = "" if command.tolerance is None else f" within {_plain(command.tolerance * 1e3)}"
+            return [f"{command.line} {'exact stops' if command.exact else f'blend{within}'}"]
         case Dwell():
             return [f"{command.line} dwell {_plain(command.duration)} s"]
         case Prime():

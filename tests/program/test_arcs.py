@@ -3,9 +3,11 @@
 import math
 
 import pytest
-from program_reading import moves, only_problem, read, refused, shown
+from program_reading import PAPER_WIDE, moves, only_problem, read, refused, shown
 
-from cdhr_host.values import Arc
+from cdhr_host.errors import ProgramError
+from cdhr_host.program import Interpreter
+from cdhr_host.values import Arc, Plane
 
 
 def arc_of(text: str) -> Arc:
@@ -99,11 +101,57 @@ def test_end_in_the_direction_of_the_start_is_a_full_turn() -> None:
     assert arc_of("G3 X-.01 I10 F600\n").sweep == pytest.approx(2 * math.pi)
 
 
-def test_other_planes_are_refused_with_the_reason() -> None:
-    for code in ("G18", "G19"):
-        problem = only_problem(code + "\n")
-        assert problem.message == f"unsupported word {code}"
-        assert "only G17" in (problem.hint or "")
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("G18\nG3 X-10 Z0 I-5 F600", "to -10 0 0 about 0 -5 by 180 deg at 10 in ZX"),
+        ("G18\nG2 X10 Y4 Z10 K10 F600", "to 10 4 10 about 10 0 by -90 deg at 10 in ZX"),
+        ("G18\nG3 X10 Y4 Z10 K10 F600", "to 10 4 10 about 10 0 by 270 deg at 10 in ZX"),
+        ("G18\nG2 X10 R5 F600", "to 10 0 0 about 0 5 by -180 deg at 10 in ZX"),
+        ("G19\nG3 Y-10 J-5 F600", "to 0 -10 0 about -5 0 by 180 deg at 10 in YZ"),
+        ("G19\nG3 X2 K5 F600", "to 2 0 0 about 0 5 by 360 deg at 10 in YZ"),
+        ("G19\nG20\nG91\nG2 Y1 Z1 R1 F60", "to 0 25.4 25.4 about 25.4 0 by -90 deg at 25.4 in YZ"),
+        ("G19\nG17\nG3 X10 I5 F600", "to 10 0 0 about 5 0 by 180 deg at 10"),
+    ],
+)
+def test_planes(text: str, expected: str) -> None:
+    assert shown(read(text + "\n"))[-1].endswith(expected)
+
+
+def test_clockwise_is_seen_from_the_positive_end_of_the_normal() -> None:
+    """A quarter turn counter-clockwise about +y goes from z to x."""
+    arc = arc_of("G1 Z10 F600\nG18\nG3 X10 Z0 K-10\n")
+    assert (arc.plane, arc.centre_G.tolist()) == (Plane.ZX, [0, 0])
+    assert arc.sweep == pytest.approx(math.pi / 2)
+
+
+@pytest.mark.parametrize(("code", "letter"), [("G17", "K"), ("G18", "J"), ("G19", "I")])
+def test_the_centre_has_no_offset_along_the_helix(code: str, letter: str) -> None:
+    problem = only_problem(f"{code}\nG2 X1 Y1 Z1 {letter}1 F600\n")
+    assert problem.message == f"G2 has no word {letter} in the plane of {code}"
+
+
+def test_arcs_of_a_hundred_metres_are_not_meant() -> None:
+    assert "long" in only_problem("G2 I99999999 F600\n").message
+    assert arc_of("G3 X100 Y0.001 R99999999 F600\n").sweep < 1e-5
+
+
+def test_the_plane_goes_on_into_the_next_text_and_is_not_left_by_a_refused_one() -> None:
+    interpreter = Interpreter(PAPER_WIDE)
+    list(interpreter.commands([b"G18\n"]))
+    with pytest.raises(ProgramError):
+        list(interpreter.commands([b"G19\nG6\n"]))
+    assert "in ZX" in shown(interpreter.commands([b"G3 I5 F600\n"]))[0]
+
+
+def test_clay_of_an_upright_arc_counts_at_its_top() -> None:
+    text = "G0 X20 Z5\nG18\nG3 X-20 I-20 E5 F600\nG0 X0\nG28\n"
+    upright, flat = read(text), read(text.replace("G18", "G17"))
+    bed = PAPER_WIDE.bed
+    assert moves(flat)[-1][2] == pytest.approx(5 + bed.clear_height * 1e3)
+    assert moves(upright)[-1][2] == pytest.approx(5 + bed.clear_height * 1e3, abs=0.01)
+    up = text.replace("G3", "G2")
+    assert moves(read(up))[-1][2] == pytest.approx(25 + bed.clear_height * 1e3, abs=0.01)
 
 
 @pytest.mark.parametrize(

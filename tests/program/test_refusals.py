@@ -13,9 +13,12 @@ from cdhr_host.program.words import nearest
 @pytest.mark.parametrize(
     ("code", "near"),
     [
-        ("G6", "G4"),
-        ("G5", "G4"),
-        ("G5.1", "G1"),
+        ("G6", "G5"),
+        ("G7", "G5"),
+        ("G5.4", "G5.1"),
+        ("G64.1", "G61.1"),
+        ("G61.2", "G61.1"),
+        ("G16", "G17"),
         ("M85", "M84"),
         ("M62", "M42"),
         ("M1060", "M106"),
@@ -35,7 +38,9 @@ def test_nearest_is_always_known() -> None:
     assert nearest("M").startswith("M")
 
 
-@pytest.mark.parametrize("code", ["G41", "G42", "G43", "G95", "G96", "M4", "M6 T1", "T1", "T15"])
+@pytest.mark.parametrize(
+    "code", ["G5.2", "G5.3", "G41", "G42", "G43", "G95", "G96", "M4", "M6 T1", "T1", "T15"]
+)
 def test_words_refused_with_the_reason(code: str) -> None:
     assert "did you mean" not in (only_problem(code + "\n").hint or "did you mean")
 
