@@ -1,5 +1,7 @@
 """How high the print stands, cell by cell, and which line of the program made it so."""
 
+import itertools
+
 import numpy as np
 
 from cdhr_host.values import Array, Flags, Ints
@@ -14,7 +16,7 @@ class HeightMap:
         self.top = 0.0
         """m: highest so far"""
         self.radius = 0.0
-        """m: farthest from the axis so far, with its cell"""
+        """m: farthest from the axis so far, with the cells around it"""
         self._half = int(np.ceil(radius / cell)) + 3
         size = 2 * self._half + 1
         self._height = np.zeros((size, size))
@@ -33,16 +35,9 @@ class HeightMap:
             self._raise(start[clay], nozzle_G[clay], line[clay])
 
     def at(self, x: Array, y: Array) -> tuple[Array, Ints]:
-        """Any shape, m -> heights, m, and lines, the highest of nine cells; nothing beyond the map."""
+        """Any shape, m -> heights, m, and lines; clay counts in the cells around its own, too."""
         i, j = self._cells(x, y)
-        height, line = np.zeros(x.shape), np.zeros(x.shape, dtype=np.int64)
-        for di in (-1, 0, 1):
-            for dj in (-1, 0, 1):
-                near = self._height[i + di, j + dj]
-                higher = near > height
-                height = np.where(higher, near, height)
-                line = np.where(higher, self._line[i + di, j + dj], line)
-        return height, line
+        return self._height[i, j], self._line[i, j]
 
     def _raise(self, start: Array, end: Array, line: Ints) -> None:
         step = np.linalg.norm(end - start, axis=1)
@@ -50,15 +45,20 @@ class HeightMap:
         whole = np.repeat(np.arange(len(pieces)), pieces)
         part = (np.arange(len(whole)) - np.repeat(np.cumsum(pieces) - pieces, pieces) + 1) / pieces[whole]
         points = start[whole] + part[:, None] * (end - start)[whole]
-        i, j = self._cells(points[:, 0], points[:, 1])
         order = np.argsort(points[:, 2], kind="stable")
-        i, j, points, whole = i[order], j[order], points[order], whole[order]
-        higher = points[:, 2] > self._height[i, j]
-        self._line[i[higher], j[higher]] = line[whole[higher]]
-        np.maximum.at(self._height, (i, j), points[:, 2])
+        points, line = points[order], line[whole[order]]
+        i, j = self._cells(points[:, 0], points[:, 1])
+        for di, dj in itertools.product((-1, 0, 1), repeat=2):
+            self._raise_cells(i + di, j + dj, points[:, 2], line)
         self.top = max(self.top, float(points[-1, 2]))
-        far = float(np.hypot(points[:, 0], points[:, 1]).max()) + self.cell
+        far = float(np.hypot(points[:, 0], points[:, 1]).max()) + 3.0 * self.cell
         self.radius = max(self.radius, far)
+
+    def _raise_cells(self, i: Ints, j: Ints, z: Array, line: Ints) -> None:
+        """By ascending z."""
+        higher = z > self._height[i, j]
+        self._line[i[higher], j[higher]] = line[higher]
+        np.maximum.at(self._height, (i, j), z)
 
     def _cells(self, x: Array, y: Array) -> tuple[Ints, Ints]:
         """Numbers of cells; places beyond the map are in its empty border."""

@@ -4,10 +4,25 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cdhr_host.mechanism import Cables, Loads, cable_state, forward, jacobian, lengths, tensions
+from cdhr_host.mechanism import (
+    POLICIES,
+    Cables,
+    Loads,
+    Pairs,
+    Policy,
+    PolicyName,
+    accelerations,
+    cable_state,
+    forward,
+    jacobian,
+    lengths,
+    shares,
+    tensions,
+)
+from cdhr_host.mechanism.pulley import PULLEYS
 from cdhr_host.profile import find, read_table, validate
 from cdhr_host.values import Array
 
@@ -79,3 +94,43 @@ def test_no_cable_is_faster_than_the_nozzle(name: str, q: Array, v: Array) -> No
     cables, loads = MACHINES[name]
     rate = cable_state(cables, loads, q, q, v, v).rate
     assert np.abs(rate).max() <= math.hypot(*v[0]) * (1 + 1e-12) + 1e-300
+
+
+models = st.sampled_from(sorted(PULLEYS))
+
+
+@given(machines, models, poses(), moves)
+def test_every_pulley_model_is_undone_by_forward(name: str, model: str, lower: Array, apart: Array) -> None:
+    cables = MACHINES[name][0].with_pulley(PULLEYS[model])
+    found = forward(cables, lengths(cables, lower, lower + apart))
+    assert np.abs(np.array(found) - [lower, lower + apart]).max() < 1e-12
+
+
+@given(machines, poses(), st.lists(st.floats(0.0, 60.0), min_size=3, max_size=3), moves)
+def test_shares_add_up_and_hold_the_platform_level(
+    name: str, lower: Array, pair: list[float], moment: Array
+) -> None:
+    cables, pairs = MACHINES[name][0], Pairs.from_profile(PROFILES[name])
+    found = shares(cables, pairs, lower, np.array([pair]), moment)
+    pulls = -jacobian(cables, lower, lower)[0, :3]
+    turning = np.cross(pairs.left, found.left.T * pulls) + np.cross(pairs.right, found.right.T * pulls)
+    assert np.abs(found.left + found.right - pair).max() < 1e-10
+    assert np.abs(turning.sum(axis=0) + moment).max() < 1e-10
+
+
+@given(machines, poses(), moves, moves, moves)
+def test_accelerations_undo_tensions(
+    name: str, lower: Array, apart: Array, below: Array, above: Array
+) -> None:
+    cables, loads = MACHINES[name]
+    force = tensions(cables, loads, lower, lower + apart / 2, below, above)
+    found = accelerations(cables, loads, lower, lower + apart / 2, force)
+    assert np.abs(np.array(found) - [below, above]).max() < 1e-9
+
+
+@settings(deadline=None)
+@given(machines, st.sampled_from(POLICIES), poses())
+def test_policies_turn_with_the_machine(name: str, policy: PolicyName, lower: Array) -> None:
+    rule = Policy.from_profile(PROFILES[name], policy)
+    turn = np.array([[np.cos(THIRD), -np.sin(THIRD), 0], [np.sin(THIRD), np.cos(THIRD), 0], [0, 0, 1]])
+    assert np.abs(rule.upper(lower @ turn.T) - rule.upper(lower) @ turn.T).max() < 1e-12

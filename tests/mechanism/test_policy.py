@@ -19,10 +19,12 @@ from cdhr_host.mechanism import (
     cable_state,
     jacobian,
     nine_tensions,
+    spring_fit,
     tensions,
     trajectories,
 )
 from cdhr_host.mechanism.policy import _fitted
+from cdhr_host.mechanism.spring_field import ROWS
 from cdhr_host.profile import Profile
 from cdhr_host.units import DEG, MM
 
@@ -268,3 +270,16 @@ def test_fits_are_kept_while_nothing_they_need_changes() -> None:
     assert _fitted.cache_info().misses <= before + 1
     other = Policy.from_profile(single_minimum("paper-wide", 2.0), "free")
     assert other.field is not first.field
+
+
+def test_a_fit_without_a_better_step_stays_where_it_began(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(spring_fit, "DAMPINGS", 0)
+    made = machine("paper-wide")
+    windows, rows = Windows.from_profile(made.profile), np.ones(ROWS, dtype=np.bool_)
+    pairs = Pairs.from_profile(made.profile)
+    field = spring_fit.best_field(made.cables, made.loads, pairs, windows, rows)
+    still = (np.zeros(3),) * 3
+    x, y, z = field.along((np.array([0.0, 0.1, -0.2]), np.zeros(3), np.zeros(3)), still, still)
+    assert not x.value.any()
+    assert not y.value.any()
+    assert_allclose(z.value, spring_fit.START * 0.5 * (3.0 + 60.0), rtol=1e-14)
