@@ -35,6 +35,7 @@ from cdhr_host.mechanism.state import cable_state
 from cdhr_host.mechanism.statics import tensions
 from cdhr_host.mechanism.stretch import Give, stretch_doubt, stretched_forward
 from cdhr_host.mechanism.transition import transition
+from cdhr_host.mechanism.turning import wrap_rates
 from cdhr_host.mechanism.workspace import Angles, Printable, Workspace, angles, printable
 
 __all__ = [
@@ -89,4 +90,5 @@ __all__ = [
     "uncompensated_error",
     "uncompensated_lengths",
     "upper_bounds",
+    "wrap_rates",
 ]

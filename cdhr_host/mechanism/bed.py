@@ -9,6 +9,7 @@ import numpy as np
 from cdhr_host.mechanism.cables import Cables, Loads
 from cdhr_host.mechanism.findings import GEOMETRY, Finding, finding
 from cdhr_host.mechanism.kinematics import lengths, reachable, slider
+from cdhr_host.mechanism.policy import Policy
 from cdhr_host.mechanism.statics import tensions
 from cdhr_host.profile import Profile
 from cdhr_host.units import MM
@@ -24,12 +25,12 @@ HALVINGS: Final = 20
 """of the bed's size when looking for the largest that would do"""
 
 
-def bed_findings(profile: Profile, cables: Cables) -> Iterator[Finding]:
+def bed_findings(profile: Profile, cables: Cables, *, sound: bool) -> Iterator[Finding]:
     """Where the cylinder leaves the reachable volume, and the largest one that would not.
 
-    The platforms move together. Looked at on a grid of radii, azimuths and heights with rim
-    and corners: between the pulley planes, all cables taut under a vertical load, sliders
-    within travel.
+    Looked at on a grid of radii, azimuths and heights with rim and corners: between the pulley
+    planes, all cables taut under a vertical load, sliders within travel. The upper platform goes
+    where the policy puts it where spring and windows are ``sound``, and with the lower one otherwise.
     """
     shape, bed = profile.geometry, profile.bed
     room = shape.upper_pulley_height - shape.reference_separation - bed.origin_z
@@ -39,7 +40,8 @@ def bed_findings(profile: Profile, cables: Cables) -> Iterator[Finding]:
         slack = [*_slack(profile, cables, within)]
         yield from slack
         if not slack and profile.sliders.travel_min < profile.sliders.travel_max:
-            yield from _travel(profile, cables, within)
+            policy = Policy.from_profile(profile, None if sound else "fixed")
+            yield from _travel(profile, cables, policy, within)
 
 
 def _planes(profile: Profile, room: float) -> Iterator[Finding]:
@@ -91,14 +93,14 @@ def _slack(profile: Profile, cables: Cables, height: float) -> Iterator[Finding]
     )
 
 
-def _travel(profile: Profile, cables: Cables, height: float) -> Iterator[Finding]:
+def _travel(profile: Profile, cables: Cables, policy: Policy, height: float) -> Iterator[Finding]:
     bed, sliders = profile.bed, profile.sliders
 
     def fits(size: float, rise: float) -> bool:
-        travel = _sliders(cables, size, rise)
+        travel = _sliders(cables, policy, size, rise)
         return bool(travel.min() >= sliders.travel_min and travel.max() <= sliders.travel_max)
 
-    travel = _sliders(cables, bed.radius, height)
+    travel = _sliders(cables, policy, bed.radius, height)
     for key, limit, extreme, sign in (
         ("travel_min", sliders.travel_min, travel.min(axis=0), -1.0),
         ("travel_max", sliders.travel_max, travel.max(axis=0), 1.0),
@@ -108,7 +110,7 @@ def _travel(profile: Profile, cables: Cables, height: float) -> Iterator[Finding
             radius = _largest(bed.radius, lambda size: fits(size, height))
             rise = _largest(height, lambda size: fits(bed.radius, size))
             yield finding(
-                GEOMETRY | BED | {f"sliders.{key}_mm"},
+                GEOMETRY | BED | {f"sliders.{key}_mm", "spring.policy"},
                 f"sliders.{key}_mm",
                 f"= {limit / MM:.6g} is exceeded in the bed: "
                 f"slider {cable + 1} goes to {extreme[cable] / MM:.6g} mm",
@@ -138,9 +140,9 @@ def _held(profile: Profile, cables: Cables, q: Array) -> bool:
     return bool((tensions(cables, weightless, q, q) > 0.0).all())
 
 
-def _sliders(cables: Cables, radius: float, height: float) -> Array:
+def _sliders(cables: Cables, policy: Policy, radius: float, height: float) -> Array:
     q = _displacements(cables, radius, height)
-    return slider(cables, lengths(cables, q, q))
+    return slider(cables, lengths(cables, q, policy.upper(q)))
 
 
 def _largest(size: float, fits: Callable[[float], bool]) -> float:

@@ -16,6 +16,7 @@ from cdhr_host.units import MM
 RISING: Final = (
     ("forces.lower_min_n", "forces.lower_max_n", "no force would be inside the window"),
     ("forces.upper_min_n", "forces.upper_max_n", "no force would be inside the window"),
+    ("forces.single_min_n", "forces.single_max_n", "no force would be inside the window"),
     ("sliders.travel_min_mm", "sliders.travel_max_mm", "the sliders could not move"),
     ("extruder.pressure_threshold_kpa", "extruder.pressure_max_kpa", "no clay would ever flow"),
     ("spring.rest_length_mm", "geometry.reference_separation_mm", "the spring would push, not pull"),
@@ -40,7 +41,9 @@ def inconsistencies(profile: Profile) -> list[Finding]:
     if not sections & {"geometry", "spring", "forces"}:
         found += _preload(profile)
     if "geometry" not in sections:
-        found += bed_findings(profile, Cables.from_profile(profile))
+        found += bed_findings(
+            profile, Cables.from_profile(profile), sound=not sections & {"spring", "forces"}
+        )
     return found
 
 

@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from cdhr_host.errors import MotionError, Problem
 from cdhr_host.mechanism.cables import Cables, Loads
 from cdhr_host.mechanism.kinematics import reachable
 from cdhr_host.mechanism.pairs import Pairs
@@ -30,8 +31,6 @@ AZIMUTHS: Final = np.linspace(0.0, 60.0, 5) * DEG
 HEIGHTS: Final = 26
 NEAR: Final = 0.06
 """a margin this far below zero counts as beyond what is possible"""
-START: Final = 1.5
-"""spring force to begin with, of the middle of the lower window"""
 PIECE: Final = 6
 """poses of a product done at once"""
 DAMPINGS: Final = 8
@@ -86,12 +85,15 @@ class _Fit:
 
 
 def best_field(cables: Cables, loads: Loads, pairs: Pairs, windows: Windows, rows: Flags) -> SpringField:
-    """``rows`` (ROWS,) of the coefficients are free, the others zero; HEIGHT_ONLY: upright."""
+    """``rows`` (ROWS,) of the coefficients are free, the others zero; HEIGHT_ONLY: upright.
+
+    Raises MotionError where the windows call for springs that leave the machine.
+    """
     domain = whole_machine(cables)
     places = _grid(cables, domain)
     used = np.repeat(rows, RISE + 1)
     full = np.zeros(len(used))
-    full[SPLITS[1] * (RISE + 1)] = START * 0.5 * (windows.low[0] + windows.high[0])
+    full[SPLITS[1] * (RISE + 1)] = loads.stiffness * (loads.separation - loads.rest_length)
     coefficients = full[used]
     matrix = basis(domain, (places[:, 0], places[:, 1], places[:, 2]))[:, :, used]
     start = matrix @ coefficients
@@ -146,8 +148,20 @@ def offset(loads: Loads, spring: Vector) -> Vector:
 
 
 def _answer(cables: Cables, loads: Loads, pairs: Pairs, places: Array, spring: Array) -> Response:
-    moved = offset(loads, (spring[:, 0], spring[:, 1], spring[:, 2]))
-    return response(cables, loads, pairs, places, places + np.column_stack(moved))
+    upper = places + np.column_stack(offset(loads, (spring[:, 0], spring[:, 1], spring[:, 2])))
+    if not reachable(cables, places, upper).all():
+        size = float(np.linalg.norm(spring, axis=1).max())
+        raise MotionError(
+            Problem(
+                "unsettled",
+                f"the best spring force, {size:.4g} N, would take the upper platform out of reach",
+                key="spring.policy",
+                value=size,
+                unit="N",
+                hint="windows in [forces] that are no wider than the cables bear, or another policy",
+            )
+        )
+    return response(cables, loads, pairs, places, upper)
 
 
 def _importance(margin: Array) -> Array:

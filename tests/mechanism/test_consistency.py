@@ -53,6 +53,7 @@ def test_shipped_profiles_are_consistent(name: str) -> None:
     [
         ({"forces__lower_min_n": 60.0}, "forces.lower_min_n", 60.0, 60.0),
         ({"forces__upper_min_n": 61.0}, "forces.upper_min_n", 61.0, 60.0),
+        ({"forces__single_min_n": 60.0}, "forces.single_min_n", 60.0, 60.0),
         ({"sliders__travel_min_mm": 0.0, "sliders__travel_max_mm": 0.0}, "sliders.travel_min_mm", 0.0, 0.0),
         ({"extruder__pressure_threshold_kpa": 200.0}, "extruder.pressure_threshold_kpa", 200.0, 200.0),
         ({"spring__rest_length_mm": 55.5}, "spring.rest_length_mm", 55.5, 55.0),
@@ -182,3 +183,21 @@ def test_a_bed_beyond_the_sliders(values: dict[str, float], key: str) -> None:
 def test_a_travel_no_smaller_bed_helps() -> None:
     found = problems(bed__origin_z_mm=1000.0, bed__height_mm=200.0, sliders__travel_max_mm=100.0)
     assert "does not help" in str(found["sliders.travel_max_mm"].hint)
+
+
+def test_the_policy_moves_the_upper_sliders() -> None:
+    """A travel that does with a constant offset, and not with the upper platform where it is best."""
+    shut = {"sliders__travel_min_mm": -375.0}
+    values = {"bed__radius_mm": 150.0, "bed__height_mm": 350.0}
+    fixed = problems(**shut, **values)
+    assert fixed == {}
+    table = read_table(find("paper-wide"))
+    for place, value in {**shut, **values}.items():
+        section, key = place.split("__")
+        table[section][key] = value
+    table["spring"]["policy"] = "free"
+    profile, found = validate(table)
+    assert found == []
+    told = inconsistencies(profile)
+    assert [problem.key for _, problem in told] == ["sliders.travel_min_mm"]
+    assert "spring.policy" in told[0][0]

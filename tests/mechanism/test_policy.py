@@ -10,6 +10,7 @@ from mechanism_oracle import Machine, machine, workspace
 from numpy.testing import assert_allclose
 from scipy.optimize import linprog
 
+from cdhr_host.errors import MotionError
 from cdhr_host.mechanism import (
     POLICIES,
     Pairs,
@@ -282,4 +283,13 @@ def test_a_fit_without_a_better_step_stays_where_it_began(monkeypatch: pytest.Mo
     x, y, z = field.along((np.array([0.0, 0.1, -0.2]), np.zeros(3), np.zeros(3)), still, still)
     assert not x.value.any()
     assert not y.value.any()
-    assert_allclose(z.value, spring_fit.START * 0.5 * (3.0 + 60.0), rtol=1e-14)
+    assert_allclose(z.value, 40.0, rtol=1e-12)
+
+
+def test_windows_wider_than_the_machine_are_refused() -> None:
+    profile = machine("paper-wide").profile
+    wide = {"lower_max": 1e5, "upper_max": 1e5, "single_max": 1e5}
+    profile = profile.model_copy(update={"forces": profile.forces.model_copy(update=wide)})
+    with pytest.raises(MotionError, match="take the upper platform out of reach") as refusal:
+        Policy.from_profile(profile, "free")
+    assert refusal.value.problems[0].key == "spring.policy"

@@ -18,6 +18,7 @@ from cdhr_host.mechanism import (
     trajectories,
     uncompensated_error,
     uncompensated_lengths,
+    wrap_rates,
 )
 from cdhr_host.mechanism.cables import LOWER, UPPER
 from cdhr_host.mechanism.kinematics import components, wraps_of
@@ -124,3 +125,25 @@ def test_uncompensated_error(row: dict[str, Any]) -> None:
     close(np.concatenate([commanded[0][0], commanded[1][0]]), row["q_actual"], 1e-6 * MM, MM)
     errors = uncompensated_error(cables, lower, upper)
     close(np.concatenate([errors[0][0], errors[1][0]]), row["error_actual_minus_desired"], 1e-6 * MM, MM)
+
+
+@pytest.mark.parametrize("row", named(VECTORS["dynamic"], "column", "traj", "t"))
+def test_wrap_rates(row: dict[str, Any]) -> None:
+    cables = machine(COLUMNS[row["column"]]).cables
+    lower, upper = zip(*(platforms(row[key]) for key in ("q", "qd", "qdd")), strict=True)
+    found = wrap_rates(cables, lower, upper)
+    close(found.rate[0], row["theta_dot"], 1e-12)
+    close(found.bend[0], row["theta_ddot"], 1e-12)
+
+
+def test_wrap_rates_are_derivatives_of_the_angle() -> None:
+    cables, rng, h = machine("paper").cables, np.random.default_rng(21), 1e-3
+    q, v, a = (rng.uniform(-size, size, (2, 50, 3)) for size in (0.2, 0.1, 0.5))
+
+    def at(t: float) -> Any:
+        moved = q + v * t + a * t**2 / 2, v + a * t, a
+        return wrap_rates(cables, *(tuple(part[k] for part in moved) for k in range(2)))
+
+    ahead, back, now = at(h), at(-h), at(0.0)
+    assert_allclose(now.rate, (ahead.value - back.value) / (2 * h), rtol=0, atol=1e-5)
+    assert_allclose(now.bend, (ahead.rate - back.rate) / (2 * h), rtol=0, atol=1e-4)
