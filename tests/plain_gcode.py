@@ -1,6 +1,7 @@
 """A second, simple reading of G-code, for checking logs only: what is drawn, how fast, with how much clay.
 
-Knows G0-G3, G20-G21, G28, G90-G92, M82-M83, M200, M220, M221; everything else draws nothing.
+Knows G0-G3, G5, G5.1, G17-G21, G28, G61, G64, G90-G92, M82-M83, M200, M220, M221; everything else
+draws nothing.
 """
 
 import math
@@ -12,20 +13,31 @@ import numpy as np
 
 WORD = re.compile(r"([A-Z])\s*([-+]?(?:\d+\.?\d*|\.\d+))?")
 LEAST_MM3 = 1e-6
+PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}
+"""Two axes of the plane, then its normal"""
+HALVINGS = 9
+"""Times a Bézier curve is cut in two before its pieces count as straight"""
 
 
 @dataclass
 class Drawing:
-    """M moves in order; arcs have a sweep that is not 0."""
+    """M moves in order; arcs have a sweep that is not 0, curves are polylines."""
 
     line: np.ndarray
     start: np.ndarray
     end: np.ndarray
     centre: np.ndarray
     sweep: np.ndarray
+    axes: np.ndarray
+    """the plane of each arc"""
     feed: np.ndarray
     """mm/s"""
     extrudes: np.ndarray
+    tolerance: np.ndarray
+    """mm it may deviate"""
+    exact: np.ndarray
+    """begins and ends at rest"""
+    curves: dict[int, np.ndarray]
     clay_mm3: float
     free_lines: list[int]
     """lines of G28, whose way is the machine's own"""
@@ -38,10 +50,15 @@ class Drawing:
     def places(self, move: int) -> np.ndarray:
         """(5, 3): evenly along a move, both ends included."""
         part = np.linspace(0, 1, 5)
+        if move in self.curves:
+            curve = self.curves[move]
+            return curve[np.linspace(0, len(curve) - 1, 5).astype(int)]
         if self.sweep[move] == 0:
             return self.start[move] + part[:, None] * (self.end[move] - self.start[move])
-        ends = self.start[move], self.end[move], self.centre[move]
-        return _on_arc(*(np.tile(place, (5, 1)) for place in ends), np.full(5, self.sweep[move]), part)
+        axes = self.axes[move]
+        ends = self.start[move][axes], self.end[move][axes], self.centre[move][axes]
+        flat = _on_arc(*(np.tile(place, (5, 1)) for place in ends), np.full(5, self.sweep[move]), part)
+        return flat[:, np.argsort(axes)]
 
     def distance(self, move: np.ndarray, point: np.ndarray) -> np.ndarray:
         """(N,), (N, 3) -> distance of each point from its move."""
@@ -49,9 +66,13 @@ class Drawing:
         curved = self.sweep[move] != 0
         if curved.any():
             of = move[curved]
-            straight[curved] = _to_arc(
-                self.start[of], self.end[of], self.centre[of], self.sweep[of], point[curved]
-            )
+            axes = self.axes[of]
+            places = (self.start[of], self.end[of], self.centre[of], point[curved])
+            start, end, centre, to = (np.take_along_axis(place, axes, 1) for place in places)
+            straight[curved] = _to_arc(start, end, centre, self.sweep[of], to)
+        for each, curve in self.curves.items():
+            here = np.flatnonzero(move == each)
+            straight[here] = [_to_polyline(curve, place) for place in point[here]]
         return straight
 
 
@@ -59,6 +80,23 @@ def _to_line(start: np.ndarray, end: np.ndarray, point: np.ndarray) -> np.ndarra
     d = end - start
     along = np.einsum("ij,ij->i", point - start, d) / np.maximum(np.einsum("ij,ij->i", d, d), 1e-300)
     return np.linalg.norm(start + np.clip(along, 0, 1)[:, None] * d - point, axis=1)
+
+
+def _to_polyline(points: np.ndarray, to: np.ndarray) -> float:
+    count = len(points) - 1
+    return float(_to_line(points[:-1], points[1:], np.tile(to, (count, 1))).min())
+
+
+def bezier(control: np.ndarray, halvings: int = HALVINGS) -> np.ndarray:
+    """(4, 3) -> (2**halvings + 1, 3): points on the curve, by halving it (de Casteljau)."""
+    if halvings == 0:
+        return control[[0, 3]]
+    a, b, c, d = control
+    ab, bc, cd = (a + b) / 2, (b + c) / 2, (c + d) / 2
+    abc, bcd = (ab + bc) / 2, (bc + cd) / 2
+    middle = (abc + bcd) / 2
+    first = bezier(np.array([a, ab, abc, middle]), halvings - 1)
+    return np.concatenate([first, bezier(np.array([middle, bcd, cd, d]), halvings - 1)[1:]])
 
 
 def _to_arc(
@@ -107,6 +145,11 @@ class Pen:
     speed: float = 1.0
     flow: float = 1.0
     scale: float = 1.0
+    plane: tuple[int, int, int] = (0, 1, 2)
+    onward: np.ndarray | None = None
+    tolerance: float = 0.0
+    exact: bool = False
+    curves: dict[int, np.ndarray] = field(default_factory=dict)
     moves: list[tuple[Any, ...]] = field(default_factory=list)
     clay: float = 0.0
     free: list[int] = field(default_factory=list)
@@ -114,6 +157,7 @@ class Pen:
 
     def __post_init__(self) -> None:
         extruder = self.profile["extruder"]
+        self.tolerance = self.profile["path"]["tolerance_mm"]
         self.area = math.pi / 4 * extruder["filament_diameter_mm"] ** 2
         self.scale = 1.0 if extruder["e_unit"] == "mm3" else self.area
 
@@ -138,33 +182,64 @@ class Pen:
             if axis in words:
                 value = words[axis] * self.unit
                 target[k] = value + self.offset[k] if self.absolute else self.at[k] + value
+        control = self.control(code, words, target)
         moved = bool(np.any(target != self.at)) or code in ("G2", "G3")
+        if control is not None:
+            moved = bool(np.any(control != self.at))
         if clay and not moved:
             self.priming.append(line)
         if moved:
             centre, sweep = self.turn(code, words, target) if code in ("G2", "G3") else (np.zeros(3), 0.0)
             limit = self.profile["limits"]["speed_max_mm_s"]
             feed = min(self.feed * self.speed, limit)
-            self.moves.append((line, self.at, target, centre, sweep, feed, clay > 0))
+            if control is not None:
+                self.curves[len(self.moves)] = bezier(control)
+            self.add(line, target, centre, sweep, feed, extrudes=clay > 0)
         self.at = target
+
+    def add(
+        self, line: int, target: np.ndarray, centre: np.ndarray, sweep: float, feed: float, *, extrudes: bool
+    ) -> None:
+        how = self.plane, feed, extrudes, self.tolerance, self.exact
+        self.moves.append((line, self.at, target, centre, sweep, *how))
+
+    def control(self, code: str, words: dict[str, float], target: np.ndarray) -> np.ndarray | None:
+        """(4, 3): control points of G5 and G5.1."""
+        first, second = (
+            np.array([words.get(x, 0.0), words.get(y, 0.0), 0.0]) * self.unit for x, y in ("IJ", "PQ")
+        )
+        onward, self.onward = self.onward, None
+        if code == "G5":
+            if "I" not in words and onward is not None:
+                first = onward
+            self.onward = -second
+            return np.array([self.at, self.at + first, target + second, target])
+        if code == "G5.1":
+            middle = self.at + first
+            return np.array([self.at, (self.at + 2 * middle) / 3, (target + 2 * middle) / 3, target])
+        return None
 
     def turn(self, code: str, words: dict[str, float], target: np.ndarray) -> tuple[np.ndarray, float]:
         if "R" in words:
             centre = self.by_radius(code, words["R"] * self.unit, target)
         else:
-            centre = self.at + np.array([words.get("I", 0.0), words.get("J", 0.0), 0.0]) * self.unit
-        a, b = self.at - centre, target - centre
+            centre = self.at + np.array([words.get(letter, 0.0) for letter in "IJK"]) * self.unit
+        axes = list(self.plane)
+        a, b = (self.at - centre)[axes], (target - centre)[axes]
         sweep = (math.atan2(b[1], b[0]) - math.atan2(a[1], a[0])) % (2 * math.pi)
         if code == "G3":
             return centre, sweep if sweep > 5e-7 else 2 * math.pi
         return centre, sweep - 2 * math.pi
 
     def by_radius(self, code: str, radius: float, target: np.ndarray) -> np.ndarray:
-        chord = target - self.at
+        axes = list(self.plane)
+        chord = (target - self.at)[axes]
         length = float(np.hypot(chord[0], chord[1]))
         rise = math.sqrt(max(radius**2 - length**2 / 4, 0.0))
         side = rise if (code == "G3") == (radius > 0) else -rise
-        return self.at + chord / 2 + side / length * np.array([-chord[1], chord[0], 0.0])
+        centre = np.zeros(3)
+        centre[axes] = self.at[axes] + chord / 2 + side / length * np.array([-chord[1], chord[0], 0.0])
+        return centre
 
     def home(self, line: int) -> None:
         """G28: the way is the machine's own; where it ended stands in the log."""
@@ -172,7 +247,8 @@ class Pen:
         self.at = self.nozzle[rows[-1]].copy() if len(rows) else np.zeros(3)
         self.offset = np.zeros(3)
         self.free.append(line)
-        self.moves.append((line, self.at, self.at, np.zeros(3), 0.0, math.inf, False))
+        self.onward = None
+        self.add(line, self.at, np.zeros(3), 0.0, math.inf, extrudes=False)
 
     def shift(self, words: dict[str, float]) -> None:
         """G92."""
@@ -187,6 +263,12 @@ class Pen:
         """The words that change how others are read."""
         if code in ("G20", "G21"):
             self.unit = 25.4 if code == "G20" else 1.0
+        elif code in PLANES:
+            self.plane = PLANES[code]
+        elif code in ("G61", "G61.1", "G64"):
+            self.exact = code != "G64"
+            usual = self.profile["path"]["tolerance_mm"]
+            self.tolerance = words["P"] * self.unit if "P" in words else usual
         elif code in ("G90", "G91"):
             self.absolute = code == "G90"
         elif code in ("M82", "M83"):
@@ -214,7 +296,7 @@ def draw(text: str, profile: dict[str, Any], lines: np.ndarray, nozzle: np.ndarr
     pen = Pen(profile, lines, nozzle)
     for number, raw in enumerate(text.split("\n"), 1):
         code, words = _words(raw)
-        if code in ("G0", "G1", "G2", "G3"):
+        if code in ("G0", "G1", "G2", "G3", "G5", "G5.1"):
             pen.draw(number, code, words)
         elif code == "G28":
             pen.home(number)
@@ -224,8 +306,8 @@ def draw(text: str, profile: dict[str, Any], lines: np.ndarray, nozzle: np.ndarr
             break
         else:
             pen.set(code, words)
-    columns = list(zip(*pen.moves, strict=True)) if pen.moves else [[] for _ in range(7)]
-    line, start, end, centre, sweep, feed, extrudes = (np.array(column) for column in columns)
-    return Drawing(
-        line, start, end, centre, sweep, feed, extrudes.astype(bool), pen.clay, pen.free, pen.priming
-    )
+    columns = list(zip(*pen.moves, strict=True)) if pen.moves else [[] for _ in range(10)]
+    line, start, end, centre, sweep, axes, feed, extrudes, tolerance, exact = map(np.array, columns)
+    flags = extrudes.astype(bool), tolerance, exact.astype(bool)
+    rest = pen.curves, pen.clay, pen.free, pen.priming
+    return Drawing(line, start, end, centre, sweep, axes, feed, *flags, *rest)

@@ -123,22 +123,24 @@ def check_feed(log: Log, drawing: Drawing) -> list[str]:
     return over("speed above F", speed, allowed, log)
 
 
-def check_path(log: Log, drawing: Drawing, tolerance: float) -> list[str]:
-    """Every row lies on the programmed path, near the move it names."""
+def check_path(log: Log, drawing: Drawing) -> list[str]:
+    """Every row lies on the programmed path, near the move it names, within that move's tolerance."""
     move = drawing.move_at(log.line)
     rows = np.flatnonzero((move >= 0) & ~np.isin(log.line, drawing.free_lines))
-    away = np.full(len(rows), np.inf)
+    away, beyond = np.full(len(rows), np.inf), np.full(len(rows), np.inf)
     for step in range(-NEIGHBOURS, NEIGHBOURS + 1):
         near = np.clip(move[rows] + step, 0, len(drawing.feed) - 1)
-        away = np.minimum(away, drawing.distance(near, log.nozzle[rows]))
-    if not len(rows) or away.max() <= tolerance + ROUNDING_MM:
+        distance = drawing.distance(near, log.nozzle[rows])
+        away = np.minimum(away, distance)
+        beyond = np.minimum(beyond, distance - drawing.tolerance[near])
+    if not len(rows) or beyond.max() <= ROUNDING_MM:
         return []
-    worst = rows[int(away.argmax())]
-    where = f"t = {log.t[worst]:.3f} s, line {log.line[worst]}"
-    return [f"off the path: {away.max():.4f} mm at {where} ({(away > tolerance).sum()} rows)"]
+    worst = int(beyond.argmax())
+    where = f"t = {log.t[rows[worst]]:.3f} s, line {log.line[rows[worst]]}"
+    return [f"off the path: {away[worst]:.4f} mm at {where} ({(beyond > ROUNDING_MM).sum()} rows)"]
 
 
-def check_covered(log: Log, drawing: Drawing, tolerance: float) -> list[str]:
+def check_covered(log: Log, drawing: Drawing) -> list[str]:
     """Every extruding move is drawn along its whole length, in order."""
     missed = []
     reach = max(200, int(0.5 / log.dt))
@@ -147,9 +149,25 @@ def check_covered(log: Log, drawing: Drawing, tolerance: float) -> list[str]:
         low = max(0, int(np.searchsorted(log.line, line, "left")) - reach)
         high = min(len(log.t), int(np.searchsorted(log.line, line, "right")) + reach)
         for point in drawing.places(move):
-            if polyline_distance(log.nozzle[low:high], point) > tolerance + ROUNDING_MM:
+            if polyline_distance(log.nozzle[low:high], point) > drawing.tolerance[move] + ROUNDING_MM:
                 missed.append(line)
     return [f"{len(set(missed))} extruding moves not covered, first line {missed[0]}"] if missed else []
+
+
+def check_stops(log: Log, drawing: Drawing, jerk: float) -> list[str]:
+    """In G61 the nozzle comes to rest at the end of every move, on its end."""
+    speed = np.linalg.norm(difference(log.nozzle, 1, log.dt), axis=1)
+    missed = []
+    for move in np.flatnonzero(drawing.exact):
+        line = drawing.line[move]
+        low = max(0, int(np.searchsorted(log.line, line, "left")) - 2)
+        high = int(np.searchsorted(log.line, line, "right")) + 2
+        away = np.linalg.norm(log.nozzle[low:high] - drawing.end[move], axis=1)
+        at = low + int(away.argmin())
+        slowest = speed[max(at - 1, 0) : at + 1].min(initial=np.inf)
+        if away.min() > jerk * log.dt**3 + ROUNDING_MM or slowest > jerk * log.dt**2:
+            missed.append(line)
+    return [f"{len(missed)} moves do not end in an exact stop, first line {missed[0]}"] if missed else []
 
 
 def polyline_distance(points: np.ndarray, to: np.ndarray) -> float:
@@ -251,14 +269,14 @@ def verify(log_path: Path, program: Path, profile_path: Path, rate: float | None
     profile = tomllib.loads(profile_path.read_text(encoding="utf-8"))
     log = read_log(log_path)
     drawing = draw(read_program(program), profile, log.line, log.nozzle)
-    tolerance = profile["path"]["tolerance_mm"]
     return [
         *check_time(log, rate or 1e3 / profile["drives"]["period_ms"]),
         *check_rest(log, profile),
         *check_limits(log, profile),
         *check_feed(log, drawing),
-        *check_path(log, drawing, tolerance),
-        *check_covered(log, drawing, tolerance),
+        *check_path(log, drawing),
+        *check_covered(log, drawing),
+        *check_stops(log, drawing, profile["limits"]["jerk_max_mm_s3"]),
         *check_air(log, drawing),
         *check_sliders(log, profile),
         *check_forces(log, profile),
