@@ -1,15 +1,27 @@
 """Setpoints to wires: the MachineLink protocol and the ways to the drives."""
 
 import difflib
+from importlib.util import find_spec
 from typing import Final
 
 from cdhr_host.drives.clock import Clock, MonotonicClock, PacedClock
 from cdhr_host.drives.link import LinkState, MachineLink
 from cdhr_host.drives.loopback import Loopback
+from cdhr_host.drives.timing import CycleTiming
 from cdhr_host.errors import DriveError, Problem
 from cdhr_host.profile.schema import Profile
 
-__all__ = ["Clock", "LinkState", "Loopback", "MachineLink", "MonotonicClock", "PacedClock", "open_link"]
+__all__ = [
+    "Clock",
+    "CycleTiming",
+    "LinkState",
+    "Loopback",
+    "MachineLink",
+    "MonotonicClock",
+    "PacedClock",
+    "make_link",
+    "open_link",
+]
 
 _FORMS: Final = {
     "loopback": "loopback:",
@@ -21,18 +33,37 @@ _FORMS: Final = {
 
 def open_link(url: str, profile: Profile, clock: Clock) -> MachineLink:
     """The link a drives URL names, opened. DriveError when there is no such link."""
-    scheme, colon, rest = url.partition(":")
-    if scheme not in _FORMS or not colon:
-        raise _unknown(url, scheme)
-    if scheme != "loopback":
-        raise _refusal(
-            f"drives '{url}' are not available yet in this version", "use loopback:, the simulated drives"
-        )
-    if rest:
-        raise _refusal(f"drives '{url}': loopback: takes nothing after the colon", "use loopback:")
-    link = Loopback(profile, clock)
+    link = make_link(url, profile, clock)
     link.open()
     return link
+
+
+def make_link(url: str, profile: Profile, clock: Clock) -> MachineLink:
+    """The link a drives URL names, still closed. DriveError when there is no such link."""
+    scheme, colon, rest = url.partition(":")
+    if not colon or not (scheme in _FORMS or _interface(scheme)):
+        raise _unknown(url, scheme)
+    if scheme == "loopback":
+        if rest:
+            raise _refusal(f"drives '{url}': loopback: takes nothing after the colon", "use loopback:")
+        return Loopback(profile, clock)
+    return _wired(url, scheme, profile, clock)
+
+
+def _wired(url: str, scheme: str, profile: Profile, clock: Clock) -> MachineLink:
+    """A link to drives outside this process; their libraries are imported only here."""
+    from cdhr_host.drives.address import split_rate  # noqa: PLC0415
+    from cdhr_host.drives.reference import default_store  # noqa: PLC0415
+    from cdhr_host.drives.sender import SenderLink  # noqa: PLC0415
+
+    if scheme == "slcan":
+        split_rate(url, "BITRATE", 1_000_000)
+    return SenderLink(url, profile, default_store())
+
+
+def _interface(scheme: str) -> bool:
+    """Whether python-can has an interface of this name."""
+    return scheme.isidentifier() and find_spec(f"can.interfaces.{scheme}") is not None
 
 
 def _unknown(url: str, scheme: str) -> DriveError:

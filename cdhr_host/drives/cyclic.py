@@ -67,6 +67,7 @@ class CyclicLink:
         self._fault: DriveError | None = None
         self._told = True
         self._held: Ints = np.zeros(6, dtype=np.int64)
+        self._torque: Ints = np.zeros(6, dtype=np.int64)
         self._rested_at: float | None = None
         self._pressure = 0.0
         self._playing = False
@@ -212,12 +213,13 @@ class CyclicLink:
     def _tell(self, sent: _Sent | None) -> None:
         if sent is None:
             self._pressure = 0.0
-            self.machine.hold(self._held if self.machine.watch.enabled else None)
+            enabled = self.machine.watch.enabled
+            self.machine.hold(self._held if enabled else None, self._torque if enabled else None)
         else:
             self._pressure = float(sent.row.pressure[0])
             self._held = sent.counts
-            torque = self._scaling.feed_forward(sent.row.tension[0])
-            self.machine.tell(sent.counts, torque, self._scaling.pressure_raw(self._pressure))
+            self._torque = self._scaling.feed_forward(sent.row.tension[0])
+            self.machine.tell(sent.counts, self._torque, self._scaling.pressure_raw(self._pressure))
 
     def _next(self) -> _Sent | None:
         """The row of this cycle; None to hold."""

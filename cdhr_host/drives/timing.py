@@ -10,6 +10,8 @@ BINS: Final = 200_000
 BUDGET: Final = 3
 """late cycles allowed among the last WINDOW"""
 WINDOW: Final = 250
+SOFT: Final = 8
+"""times BUDGET where soft real time is allowed"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,16 +26,22 @@ class CycleTiming:
     skipped: int
     """cycles that never were, because the one before ended too late"""
     late: int
-    """cycles whose setpoints left after their deadline"""
+    """cycles that began more than a period late"""
     real_time: bool
     """whether the sender ran under SCHED_FIFO"""
 
 
 class Lateness:
-    """A histogram of lateness, and the budget of late cycles; nothing grows."""
+    """A histogram of lateness, and the budget of late cycles; nothing grows.
 
-    def __init__(self) -> None:
+    Two cycles lost in a row are too many, or more than BUDGET in a WINDOW. With ``soft`` > 0
+    up to that many in a row pass and SOFT times the budget: the drives stand still meanwhile.
+    """
+
+    def __init__(self, soft: int = 0) -> None:
         self.real_time = False
+        self._in_a_row = max(soft, 1)
+        self._budget = BUDGET * SOFT if soft else BUDGET
         self.reset()
 
     def reset(self) -> None:
@@ -42,6 +50,7 @@ class Lateness:
         self._cycles = self._skipped = self._late = 0
         self._max = 0.0
         self._late_at: list[int] = []
+        self._row, self._last = 0, -2
 
     def woke(self, late: float) -> None:
         """A cycle began ``late`` s after it was due."""
@@ -50,13 +59,13 @@ class Lateness:
         self._bins[min(int(late / BIN), BINS - 1)] += 1
 
     def missed(self, skipped: int) -> bool:
-        """A cycle was too late, ``skipped`` more never were; whether the budget is exceeded."""
+        """A cycle came ``skipped`` >= 1 periods too late; whether the budget is exceeded."""
         self._skipped += skipped
         self._late += 1
-        recent = [at for at in self._late_at if at > self._cycles - WINDOW]
-        in_a_row = skipped > 1 or (bool(recent) and recent[-1] == self._cycles - 1)
-        self._late_at = [*recent, self._cycles]
-        return in_a_row or len(self._late_at) > BUDGET
+        row = self._row + skipped if self._cycles - self._last <= 1 else skipped
+        self._row, self._last = row, self._cycles
+        self._late_at = [*(at for at in self._late_at if at > self._cycles - WINDOW), self._cycles]
+        return row > self._in_a_row or len(self._late_at) > self._budget
 
     def summary(self) -> CycleTiming:
         """So far."""

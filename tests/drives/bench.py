@@ -167,7 +167,7 @@ class Bench:
     """A link to six simulated drives and a coupler, and everything to spoil it with."""
 
     def __init__(self, profile=PAPER, wire=MemoryWire, far=None, store=None, **changes):
-        settings = profile.canopen.model_copy(update=changes)
+        settings = profile.canopen.model_copy(update={"allow_soft_realtime": False} | changes)
         self.profile = profile.model_copy(update={"canopen": settings})
         self.clock = FarClock()
         self.far = Station(self.profile) if far is None else far(self.profile)

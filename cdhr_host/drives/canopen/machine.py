@@ -33,8 +33,8 @@ from cdhr_host.values import Ints
 
 ANSWERS: Final = 0.3
 """of the period until the answers to a SYNC are read"""
-DEADLINE: Final = 0.8
-"""of the period until the setpoints must have left"""
+AT_LEAST: Final = 0.1
+"""of the period the answers get when SYNC was late"""
 DEPTH: Final = 2
 HEARTBEAT: Final = 0.05
 """s between two heartbeats of the host; only the cycle sends them"""
@@ -59,7 +59,9 @@ class CanopenMachine:
         self.bus = bus
         self.axes = [Axis(node) for node in NODES[:6]]
         self.watch = Watch(profile, bus, self.axes)
-        self.lateness = Lateness()
+        settings = profile.canopen
+        watchdog = int(settings.setpoint_watchdog / profile.drives.period) - 1
+        self.lateness = Lateness(watchdog if settings.allow_soft_realtime else 0)
         self.inputs = (0, 0, 0, 0)
         self.digital: int | None = None
         self.due = math.inf
@@ -100,14 +102,17 @@ class CanopenMachine:
         self.bus.port.send(self._beginning(clock.now()))
         for axis in self.axes:
             axis.missed += 1
-        clock.wait_until(max(self.due, clock.now()) + ANSWERS * self._period)
+        clock.wait_until(max(self.due + ANSWERS * self._period, clock.now() + AT_LEAST * self._period))
         self.bus.pump()
         pending, self._pending = self._pending, []
         yield from pending
         yield from self.watch.findings(clock.now())
         late, self._late = self._late, False
         if late and self.streaming:
-            yield fault("setpoint-late", "setpoints came too late for the drives, again and again")
+            worst = self.lateness.summary().max
+            yield fault(
+                "setpoint-late", f"setpoints came too late for the drives, {worst * 1e3:.1f} ms at worst"
+            )
 
     def tell(self, target: Ints, feed_forward: Ints, pressure: int) -> None:
         """(6,) position units, (6,) thousandths of rated torque, raw pressure; ends the cycle."""
@@ -121,16 +126,12 @@ class CanopenMachine:
             self._valve = valve
             frames.append((0x200 + COUPLER, bytes([valve])))
         self.bus.port.send(frames)
-        late = self.bus.clock.now() - self.due
         self.due += self._period
-        if late > DEADLINE * self._period:
-            skipped = max(0, math.floor((self.bus.clock.now() - self.due) / self._period) + 1)
-            self.due += skipped * self._period
-            self._late |= self.lateness.missed(skipped)
 
-    def hold(self, target: Ints | None = None) -> None:
-        """Tell every axis to stay: at ``target``, or where it is."""
-        self.tell(self.position if target is None else target, np.zeros(6, dtype=np.int64), 0)
+    def hold(self, target: Ints | None = None, feed_forward: Ints | None = None) -> None:
+        """Tell every axis to stay: at ``target``, or where it is; air off."""
+        torque = np.zeros(6, dtype=np.int64) if feed_forward is None else feed_forward
+        self.tell(self.position if target is None else target, torque, 0)
 
     def enable(self) -> Ints:
         """Step by step to operation enabled, without a bump; (6,) where the axes are held.
@@ -214,9 +215,10 @@ class CanopenMachine:
         return axis.answers < ALIVE
 
     def _wake(self, now: float) -> None:
+        """SYNC is ours: less than a period late it only jitters, beyond that cycles are skipped."""
         late = now - self.due
         self.lateness.woke(max(late, 0.0))
-        if late > self._period:
+        if late >= self._period:
             skipped = math.floor(late / self._period)
             self.due += skipped * self._period
             self._late |= self.lateness.missed(skipped)

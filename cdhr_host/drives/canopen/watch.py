@@ -20,6 +20,8 @@ from cdhr_host.units import KPA, MM
 
 FEEDBACK_LOST: Final = 3
 """answers in a row that may be missing less one"""
+SOFT_SILENCE: Final = 0.1
+"""s without answers that pass where soft real time is allowed: serial lines deliver late too"""
 UNFOLLOWING: Final = 2
 ENCODER_LOST: Final = (0x7300, 0x7320)
 
@@ -32,7 +34,8 @@ class Watch:
         self._bus = bus
         self._axes = axes
         self._heartbeat = settings.heartbeat
-        self._patience = FEEDBACK_LOST * settings.feedback_every
+        soft = round(SOFT_SILENCE / profile.drives.period) if settings.allow_soft_realtime else 0
+        self._patience = max(FEEDBACK_LOST * settings.feedback_every, soft)
         reach = profile.sliders.speed_max * profile.drives.period * settings.feedback_every
         self._jump = (3.0 * reach + profile.drives.following_error_max) / settings.position_unit
         self._unit = settings.position_unit

@@ -30,11 +30,15 @@ class Station:
 
     ``received`` has six position units and the raw pressure of each cycle in which all six
     axes followed a fresh setpoint, ``lost`` counts cycles in which an axis had to guess.
+    Silence is judged ``grace`` s late, for wires that deliver late themselves.
     ``inbound`` and ``outbound`` stand for the wire: each frame becomes none, one or more.
     """
 
-    def __init__(self, profile: Profile, disturbance: Disturbance = undisturbed) -> None:
+    def __init__(
+        self, profile: Profile, disturbance: Disturbance = undisturbed, *, grace: float = 0.0
+    ) -> None:
         self.profile = profile
+        self._grace = grace
         self.period = profile.drives.period
         self.drives = [Drive(k + 1, self.period) for k in range(6)]
         self.coupler = Coupler(7)
@@ -98,10 +102,11 @@ class Station:
             else:
                 for node in self.nodes:
                     node.receive(now, cob, data)
+        judged = now - self._grace
         for node in self.nodes:
-            node.tick(now)
-        while now - self._stepped > 2.5 * self.period:
-            self._coast(now)
+            node.tick(judged)
+        while judged - self._stepped > 2.5 * self.period:
+            self._coast(judged)
         sent = [frame for node in self.nodes for frame in node.outbox]
         for node in self.nodes:
             node.outbox.clear()

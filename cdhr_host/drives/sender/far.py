@@ -1,0 +1,212 @@
+"""What runs in the sender's process: cycles, the ring, and one command at a time.
+
+No logging, no garbage collection, no thread, no allocation that grows: the loop does a
+cycle, moves rows, publishes where it is.
+"""
+
+import ctypes
+import gc
+import os
+import signal
+from dataclasses import dataclass
+from enum import IntEnum
+from multiprocessing.connection import Connection
+from multiprocessing.shared_memory import SharedMemory
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from cdhr_host.drives.address import port_of
+from cdhr_host.drives.clock import MonotonicClock
+from cdhr_host.drives.cyclic import CyclicLink
+from cdhr_host.drives.faults import fault
+from cdhr_host.drives.link import LinkState
+from cdhr_host.drives.reference import ReferenceStore
+from cdhr_host.drives.sender.ring import FEEDBACK, SETPOINTS, Ring, packed, setpoints, width
+from cdhr_host.errors import DriveError
+from cdhr_host.profile.schema import Profile
+from cdhr_host.values import Feedback, Setpoints
+
+PRIORITY: Final = 60
+CAPACITY: Final = 1024
+"""setpoints in the ring, besides those in the sender's own buffer"""
+RESULTS: Final = 16384
+IDLE: Final = 0.05
+"""s between two looks for commands while there is no cycle"""
+JITTER: Final = 0.5
+"""of the period a cycle may at most be late in the timing test"""
+STATES: Final = list(LinkState)
+
+
+class Word(IntEnum):
+    """Words of the status block."""
+
+    CYCLES = 0
+    STATE = 1
+    STOP_TICK = 2
+    FAULTS = 3
+    EXECUTED = 4
+
+
+NOWHERE: Final = -(2**62)
+"""stop tick while there is none"""
+
+
+@dataclass(frozen=True, slots=True)
+class Spec:
+    """All a sender needs to know."""
+
+    url: str
+    profile: Profile
+    store: Path
+    rows: str
+    results: str
+    status: str
+
+
+def run(spec: Spec, commands: Connection) -> None:
+    """The process's main function; ends when the link was closed or the host is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sender = Sender(spec, commands)
+    real_time = hurry()
+    try:
+        sender.loop(real_time)
+    finally:
+        sender.end()
+
+
+def hurry() -> bool:
+    """SCHED_FIFO for all (the only) threads, memory locked, collector off; whether FIFO was allowed."""
+    gc.collect()
+    gc.freeze()
+    gc.disable()
+    ctypes.CDLL(None).mlockall(3)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+    except PermissionError:
+        return False
+    return True
+
+
+class Sender:
+    """A CyclicLink driven by commands from a pipe and rows from a ring."""
+
+    def __init__(self, spec: Spec, commands: Connection) -> None:
+        self._profile = spec.profile
+        self._commands = commands
+        self._rows = Ring(width(SETPOINTS, Setpoints), CAPACITY, spec.rows)
+        self._results = Ring(width(FEEDBACK, Feedback), RESULTS, spec.results)
+        self._memory = SharedMemory(spec.status)
+        self._status = np.ndarray((len(Word),), np.int64, self._memory.buf)
+        clock = MonotonicClock()
+        self._link = CyclicLink(spec.profile, clock, lambda: port_of(spec.url), ReferenceStore(spec.store))
+        self._alive = True
+        self._punctual = True
+        self._real_time = False
+
+    def loop(self, real_time: bool) -> None:
+        """Cycles until the end."""
+        self._real_time = real_time
+        while self._alive:
+            waits = self._link.due == float("inf")
+            self._obey(IDLE if waits else 0.0)
+            if self._link.due != float("inf"):
+                self._link.turn()
+                self._move()
+            self._publish()
+
+    def end(self) -> None:
+        """Whatever happened: at rest, voltage off, memory given back."""
+        try:
+            self._link.close()
+        except DriveError:
+            self._link.state = LinkState.CLOSED
+        self._publish()
+        self._rows.close()
+        self._results.close()
+        del self._status
+        self._memory.close()
+
+    def _obey(self, patience: float) -> None:
+        """Do what the host asks; a host that is gone asks for the end."""
+        try:
+            if not self._commands.poll(patience):
+                return
+            name, *arguments = self._commands.recv()
+        except (EOFError, OSError):
+            self._abandoned()
+            return
+        try:
+            answer: Any = getattr(self, f"_do_{name}")(*arguments)
+            self._publish()
+            self._commands.send(("done", answer))
+        except DriveError as error:
+            self._publish()
+            self._commands.send(("refused", error.problems))
+
+    def _abandoned(self) -> None:
+        self._take_rows()
+        self._alive = False
+
+    def _do_open(self) -> list[str]:
+        self._link.open()
+        lateness = self._link.machine.lateness
+        lateness.real_time = self._real_time
+        lateness.reset()
+        until = self._link.due + self._profile.canopen.jitter_test
+        while self._link.due < until:
+            self._link.turn()
+        found = lateness.summary()
+        self._punctual = found.max < JITTER * self._profile.drives.period
+        test = f"timing test: p99.9 {found.p999 * 1e3:.3f} ms, worst {found.max * 1e3:.3f} ms late"
+        return [*self._link.notes, test + ("" if self._real_time else ", without real-time priority")]
+
+    def _do_arm(self, start: list[float]) -> None:
+        if not self._punctual and not self._profile.canopen.allow_soft_realtime:
+            raise fault("jitter", "the timing test failed: setpoints would come too late")
+        self._link.arm(np.array(start))
+
+    def _do_stop(self) -> None:
+        self._take_rows()
+        self._link.stop()
+
+    def _do_close(self) -> None:
+        self._link.close()
+        self._alive = False
+
+    def _do_timing(self) -> object:
+        return self._link.timing()
+
+    def _do_home(self) -> None:
+        self._link.home()
+
+    def _do_reference(self) -> None:
+        self._link.set_reference()
+
+    def _do_slider(self) -> list[float]:
+        return [float(at) for at in self._link.slider]
+
+    def _move(self) -> None:
+        """Rows in, results out; a fault goes to the host once."""
+        try:
+            self._take_rows()
+            executed = self._link.feedback()
+        except DriveError as error:
+            self._commands.send(("fault", error.problems))
+            self._status[Word.FAULTS] += 1
+            return
+        if len(executed):
+            self._results.write(packed(executed, FEEDBACK))
+
+    def _take_rows(self) -> None:
+        free = self._link.free
+        if free and len(records := self._rows.take(free)):
+            self._link.feed(setpoints(records))
+
+    def _publish(self) -> None:
+        self._status[Word.STATE] = STATES.index(self._link.state)
+        stop = self._link.stop_tick
+        self._status[Word.STOP_TICK] = NOWHERE if stop is None else stop
+        self._status[Word.EXECUTED] = self._results.written
+        self._status[Word.CYCLES] += 1

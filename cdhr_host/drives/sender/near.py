@@ -1,0 +1,238 @@
+"""The host's side of the sender: a MachineLink that fills a ring."""
+
+import multiprocessing
+import time
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from multiprocessing.shared_memory import SharedMemory
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from cdhr_host.drives.checks import STANDS_WITHIN, check_rows
+from cdhr_host.drives.faults import fault
+from cdhr_host.drives.link import LinkState
+from cdhr_host.drives.rows import no_feedback
+from cdhr_host.drives.sender.far import CAPACITY, NOWHERE, RESULTS, STATES, Spec, Word, run
+from cdhr_host.drives.sender.ring import FEEDBACK, SETPOINTS, Ring, feedback, packed, width
+from cdhr_host.drives.timing import CycleTiming
+from cdhr_host.errors import DriveError, Problem
+from cdhr_host.motion.hold import path_true_stop
+from cdhr_host.profile.schema import Profile
+from cdhr_host.values import Array, Feedback, Setpoints
+
+SILENCE: Final = 1.0
+"""s without a cycle after which a sender counts as dead"""
+ANSWER: Final = 180.0
+"""s a command may take; homing takes longest"""
+
+
+class SenderLink:
+    """MachineLink whose cycles run in a process of their own; see ``MachineLink``."""
+
+    def __init__(self, url: str, profile: Profile, store: Path) -> None:
+        self.profile = profile
+        self.state = LinkState.CLOSED
+        self.stop_tick: int | None = None
+        self.resolution = profile.canopen.position_unit
+        self.notes: list[str] = []
+        self._url, self._store = url, store
+        self._process: BaseProcess | None = None
+        self._fault: DriveError | None = None
+        self._tail = np.zeros(6)
+        self._next_tick: int | None = None
+        self._fed = self._collected = self._seen_cycles = 0
+        self._timing: CycleTiming | None = None
+
+    @property
+    def free(self) -> int:
+        """Rows that ``feed`` would accept."""
+        return self._rows.space if self.state in (LinkState.ARMED, LinkState.RUNNING) else 0
+
+    @property
+    def buffered(self) -> int:
+        """Rows accepted whose outcome has not come back."""
+        return self._fed - self._collected
+
+    @property
+    def slider(self) -> Array:
+        """(6,) m, as last answered by the drives."""
+        return np.array(self._ask("slider"))
+
+    @property
+    def pid(self) -> int | None:
+        """Of the sender."""
+        return self._process.pid if self._process is not None else None
+
+    def timing(self) -> CycleTiming | None:
+        """Lateness of the cycles since arming."""
+        if self._process is not None and self._process.is_alive():
+            self._timing = self._ask("timing")
+        return self._timing
+
+    def stop_rows(self, ahead: Setpoints) -> Setpoints:
+        """What is played instead of ``ahead`` once the link stops."""
+        return path_true_stop(ahead, self.profile)
+
+    def open(self) -> None:
+        """CLOSED -> OPEN: start the sender, bring-up, timing test."""
+        if self.state is not LinkState.CLOSED:
+            raise DriveError(Problem("state", f"the drives are {self.state.value}, not closed"))
+        self._start()
+        try:
+            self.notes = self._ask("open")
+        except BaseException:
+            self._end()
+            raise
+
+    def arm(self, start: Array) -> None:
+        """OPEN or STOPPED -> ARMED, holding (6,) m ``start``."""
+        self._fault_if_known()
+        self._ask("arm", [float(at) for at in np.ravel(start)])
+        self._tail, self._next_tick = np.array(start), None
+        self._fed = self._collected = 0
+        self.stop_tick = None
+
+    def feed(self, setpoints: Setpoints) -> int:
+        """Put the first rows there is room for into the ring; how many."""
+        self._look()
+        if self.state not in (LinkState.ARMED, LinkState.RUNNING):
+            self._fault_if_known()
+            raise DriveError(Problem("state", f"the drives are {self.state.value}, not armed or running"))
+        if not len(setpoints):
+            return 0
+        reach = STANDS_WITHIN if self._next_tick is None else None
+        check_rows(setpoints, self.profile, tick=self._next_tick, before=self._tail, reach=reach)
+        accepted = setpoints[: self.free]
+        if len(accepted):
+            self._rows.write(packed(accepted, SETPOINTS))
+            self._fed += len(accepted)
+            self._tail, self._next_tick = accepted.slider[-1], int(accepted.tick[-1]) + 1
+        return len(accepted)
+
+    def feedback(self) -> Feedback:
+        """What was executed since the last call."""
+        self._look()
+        if self._process is None:
+            return no_feedback()
+        rows = feedback(self._results.take(RESULTS))
+        self._collected += len(rows)
+        return rows
+
+    def stop(self) -> None:
+        """Come to rest on the path, air off."""
+        if self._process is None:
+            raise DriveError(Problem("state", "the drives are closed, not open"))
+        if self.state is not LinkState.FAULT:
+            self._ask("stop")
+
+    def home(self) -> None:
+        """Reference every axis by homing, one after the other."""
+        self._ask("home")
+
+    def set_reference(self) -> None:
+        """The machine stands at its reference pose: remember it."""
+        self._ask("reference")
+
+    def close(self) -> None:
+        """-> CLOSED; what moves is stopped on the path first."""
+        if self._process is None:
+            return
+        try:
+            if self._process.is_alive():
+                self._ask("close")
+        except DriveError:
+            self._process.kill()
+        self._end()
+
+    def _start(self) -> None:
+        self._rows = Ring(width(SETPOINTS, Setpoints), CAPACITY)
+        self._results = Ring(width(FEEDBACK, Feedback), RESULTS)
+        self._memory = SharedMemory(create=True, size=8 * len(Word))
+        self._status = np.ndarray((len(Word),), np.int64, self._memory.buf)
+        self._status[:] = 0
+        self._status[Word.STOP_TICK] = NOWHERE
+        context = multiprocessing.get_context("spawn")
+        self._pipe: Connection
+        self._pipe, far = context.Pipe()
+        spec = Spec(
+            self._url, self.profile, self._store, self._rows.name, self._results.name, self._memory.name
+        )
+        self._process = context.Process(target=run, args=(spec, far), name="cdhr-sender")
+        self._process.start()
+        far.close()
+        self._fault = None
+        self._progress = time.monotonic()
+
+    def _end(self) -> None:
+        """The sender has ended or must."""
+        assert self._process is not None
+        self._pipe.close()
+        self._process.join(10.0)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+        self._process = None
+        del self._status
+        self._memory.close()
+        self._memory.unlink()
+        self._rows.close()
+        self._results.close()
+        self.state = LinkState.CLOSED
+
+    def _ask(self, name: str, *arguments: Any) -> Any:
+        """A command and its answer; raises DriveError when it is refused or the sender is dead."""
+        if self._process is None:
+            raise DriveError(Problem("state", "the drives are closed, not open"))
+        try:
+            self._pipe.send((name, *arguments))
+            while True:
+                if not self._pipe.poll(ANSWER):
+                    raise self._dead("does not answer")
+                kind, answer = self._pipe.recv()
+                if kind == "fault":
+                    self._fault = DriveError(answer)
+                    continue
+                break
+        except (EOFError, OSError) as error:
+            raise self._dead("ended") from error
+        self._read_status()
+        if kind == "refused":
+            raise DriveError(answer)
+        return answer
+
+    def _look(self) -> None:
+        """Read the status; raises a fault that is new."""
+        if self._process is None:
+            raise DriveError(Problem("state", "the drives are closed, not open"))
+        self._read_status()
+        try:
+            while self._pipe.poll():
+                _, problems = self._pipe.recv()
+                self._fault = DriveError(problems)
+                raise self._fault
+        except (EOFError, OSError) as error:
+            raise self._dead("ended") from error
+        cycles = int(self._status[Word.CYCLES])
+        if cycles != self._seen_cycles:
+            self._seen_cycles, self._progress = cycles, time.monotonic()
+        elif time.monotonic() - self._progress > SILENCE and self.state is not LinkState.FAULT:
+            raise self._dead("stands still")
+
+    def _read_status(self) -> None:
+        if self._fault is not None and self._fault.problems[0].kind == "sender":
+            return
+        self.state = STATES[int(self._status[Word.STATE])]
+        stop = int(self._status[Word.STOP_TICK])
+        self.stop_tick = None if stop == NOWHERE else stop
+
+    def _dead(self, how: str) -> DriveError:
+        if self._fault is None or self._fault.problems[0].kind != "sender":
+            self._fault = fault("sender", f"the sending process {how}")
+        self.state = LinkState.FAULT
+        return self._fault
+
+    def _fault_if_known(self) -> None:
+        if self._fault is not None and self.state is LinkState.FAULT:
+            raise self._fault

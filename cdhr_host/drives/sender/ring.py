@@ -1,0 +1,112 @@
+"""Rings of records in shared memory: one process writes, one reads, nobody waits."""
+
+from dataclasses import fields
+from multiprocessing.shared_memory import SharedMemory
+from typing import Any, Final
+
+import numpy as np
+
+from cdhr_host.values import Array, Feedback, Setpoints
+
+SETPOINTS: Final = {"nozzle_G": 3, "upper": 3, "slider": 6, "tension": 6}
+FEEDBACK: Final = {"setpoint": 6, "slider": 6, "counts": 6, "torque": 6, "force": 3}
+WHOLE: Final = ("tick", "line", "counts")
+"""columns of whole numbers; below 2**53 they survive as float64"""
+HEAD: Final = 16
+"""bytes of the two counters"""
+
+
+class Ring:
+    """``capacity`` records of ``width`` float64; ``written`` and ``taken`` only ever grow.
+
+    Each counter is an aligned 8-byte word that one side writes after the records it stands
+    for, so that the other side never sees a record before it is complete.
+    """
+
+    def __init__(self, width: int, capacity: int, name: str | None = None) -> None:
+        self.capacity = capacity
+        self._memory = SharedMemory(name, create=name is None, size=HEAD + 8 * width * capacity)
+        self._owner = name is None
+        self._counters = np.ndarray((2,), np.int64, self._memory.buf)
+        self._records = np.ndarray((capacity, width), np.float64, self._memory.buf, HEAD)
+        if self._owner:
+            self._counters[:] = 0
+
+    @property
+    def name(self) -> str:
+        """For the other process."""
+        return self._memory.name
+
+    @property
+    def written(self) -> int:
+        """Records ever written."""
+        return int(self._counters[0])
+
+    @property
+    def space(self) -> int:
+        """Records there is room for."""
+        return self.capacity - self.written + int(self._counters[1])
+
+    def write(self, records: Array) -> None:
+        """(N, width), N <= space."""
+        at = self.written
+        slots = (at + np.arange(len(records))) % self.capacity
+        self._records[slots] = records
+        self._counters[0] = at + len(records)
+
+    def take(self, most: int) -> Array:
+        """(N, width), the oldest records, N <= most."""
+        at = int(self._counters[1])
+        count = min(self.written - at, most)
+        if count <= 0:
+            return self._records[:0].copy()
+        records = self._records[(at + np.arange(count)) % self.capacity]
+        self._counters[1] = at + count
+        return records
+
+    def close(self) -> None:
+        """Give the memory back; the owner's ``close`` removes it."""
+        del self._counters, self._records
+        self._memory.close()
+        if self._owner:
+            self._memory.unlink()
+
+
+def width(columns: dict[str, int], kind: type[Setpoints] | type[Feedback]) -> int:
+    """Numbers in a record of this kind."""
+    return sum(columns.get(field.name, 1) for field in fields(kind))
+
+
+def packed(rows: Setpoints | Feedback, columns: dict[str, int]) -> Array:
+    """Rows -> (N, width) records."""
+    count = len(rows)
+    parts = []
+    for field in fields(rows):
+        values = getattr(rows, field.name)
+        wide = columns.get(field.name, 1)
+        missing = len(values) != count
+        parts.append(np.full((count, wide), np.nan) if missing else values.reshape(count, wide))
+    return np.hstack(parts).astype(np.float64)
+
+
+def setpoints(records: Array) -> Setpoints:
+    """(N, width) records -> rows."""
+    return Setpoints(**_columns(records, Setpoints, SETPOINTS))
+
+
+def feedback(records: Array) -> Feedback:
+    """(N, width) records -> rows."""
+    return Feedback(**_columns(records, Feedback, FEEDBACK))
+
+
+def _columns(
+    records: Array, kind: type[Setpoints] | type[Feedback], columns: dict[str, int]
+) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    at = 0
+    for field in fields(kind):
+        wide = columns.get(field.name, 1)
+        values = records[:, at : at + wide].copy() if wide > 1 else records[:, at].copy()
+        found[field.name] = values.astype(np.int64) if field.name in WHOLE else values
+        at += wide
+    return found

@@ -1,0 +1,200 @@
+"""The sender's process: rings, commands, and what happens when a process dies. Real terminals."""
+
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from trajectories import PAPER, run_of
+
+from cdhr_host.drives import LinkState, MonotonicClock
+from cdhr_host.drives.rows import joined
+from cdhr_host.drives.sender import SenderLink
+from cdhr_host.drives.sender.ring import FEEDBACK, SETPOINTS, Ring, feedback, packed, setpoints, width
+from cdhr_host.errors import DriveError
+from cdhr_host.job import stream
+from cdhr_host.plant import Machine
+from cdhr_host.values import Feedback, Setpoints
+
+ROOT = Path(__file__).resolve().parents[2]
+ZERO = np.zeros(6)
+PATIENT = PAPER.model_copy(
+    update={"canopen": PAPER.canopen.model_copy(update={"jitter_test": 0.1, "setpoint_watchdog": 0.1})}
+)
+"""a machine for a computer that runs tests besides"""
+
+
+class Far:
+    """``cdhr sim`` in its own process."""
+
+    def __init__(self, folder):
+        self.record = folder / "received.csv"
+        arguments = [sys.executable, "-m", "cdhr_host", "sim", "--record", str(self.record)]
+        self.process = subprocess.Popen(arguments, cwd=ROOT, stdout=subprocess.PIPE, text=True)
+        assert select.select([self.process.stdout], [], [], 30.0)[0]
+        self.url = self.process.stdout.readline().strip()
+
+    def end(self, how=signal.SIGTERM):
+        if self.process.poll() is None:
+            self.process.send_signal(how)
+        self.process.wait(20.0)
+        self.process.stdout.close()
+        path = self.record.with_suffix(".json")
+        return json.loads(path.read_text()) if path.exists() else {}
+
+
+@contextmanager
+def running(tmp_path):
+    """A machine in the middle of a long run."""
+    far = Far(tmp_path)
+    link = SenderLink(far.url, PATIENT, tmp_path / "references.json")
+    try:
+        link.open()
+        link.arm(ZERO)
+        rows = run_of(3000, seed=5)
+        link.feed(rows[: link.free])
+        _until(lambda: len(link.feedback()) > 0)
+        yield far, link, rows
+    finally:
+        link.close()
+        far.end()
+
+
+def _until(done, patience=20.0):
+    end = time.monotonic() + patience
+    while time.monotonic() < end:
+        if done():
+            return
+        select.select([], [], [], 0.02)
+    raise AssertionError("it never came")
+
+
+def test_rows_survive_the_ring():
+    rows = run_of(300)
+    _, executed = Machine(PAPER).step(Machine(PAPER).standing(ZERO), rows)
+    ring = Ring(width(SETPOINTS, Setpoints), 128)
+    back = []
+    for k in range(0, 300, 50):
+        ring.write(packed(rows[k : k + 50], SETPOINTS))
+        assert ring.space == 78
+        back.append(setpoints(ring.take(30)))
+        back.append(setpoints(ring.take(100)))
+        assert ring.space == 128
+    got = joined(back)
+    for name in ("tick", "t", "line", "nozzle_G", "upper", "slider", "tension", "flow", "pressure"):
+        assert (getattr(got, name) == getattr(rows, name)).all()
+    assert len(ring.take(10)) == 0
+    ring.close()
+    again = feedback(packed(executed, FEEDBACK))
+    assert (again.counts == executed.counts).all()
+    assert again.counts.dtype == np.int64
+    assert width(FEEDBACK, Feedback) == 29
+
+
+def test_run_through_the_sender_is_received_tick_by_tick(tmp_path):
+    far = Far(tmp_path)
+    link = SenderLink(far.url, PATIENT, tmp_path / "references.json")
+    rows = run_of(500)
+    try:
+        link.open()
+        assert any("timing test" in note for note in link.notes)
+        summary = stream(iter([rows[:300], rows[300:]]), link, MonotonicClock(), start=ZERO)
+        assert summary.ticks == 500
+        assert summary.timing.cycles >= 500
+        assert summary.timing.p50 < PAPER.drives.period
+        assert link.state is LinkState.STOPPED
+    finally:
+        link.close()
+        report = far.end()
+    assert report["at_rest"]
+    assert report["pressure_raw"] == 0
+    received = np.loadtxt(far.record, delimiter=",", skiprows=1)[:, :6]
+    wanted = np.rint(rows.slider / link.resolution)
+    assert any((received[k : k + 500] == wanted).all() for k in range(len(received) - 499))
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
+def test_drives_stop_by_themselves_when_the_sender_dies(tmp_path, how):
+    with running(tmp_path) as (far, link, _):
+        pid = link.pid
+        os.kill(pid, how)
+        with pytest.raises(DriveError, match="the sending process"):
+            _until(lambda: len(link.feedback()) < 0)
+        assert link.state is LinkState.FAULT
+        with pytest.raises(DriveError, match="the sending process"):
+            link.arm(ZERO)
+        time.sleep(0.4)
+        os.kill(pid, signal.SIGKILL)
+        report = far.end()
+    assert report["at_rest"]
+    assert report["pressure_raw"] == 0
+    assert set(report["states"]) == {"switch_on_disabled"}
+
+
+def test_unplugged_far_side_is_a_fault_of_the_next_cycle(tmp_path):
+    with running(tmp_path) as (far, link, _):
+        far.end(signal.SIGKILL)
+        with pytest.raises(DriveError, match="is gone"):
+            _until(lambda: len(link.feedback()) < 0)
+        assert link.state is LinkState.FAULT
+
+
+def test_machine_stops_on_its_path_when_the_feeder_starves(tmp_path):
+    with running(tmp_path) as (far, link, _):
+        parts = []
+        with pytest.raises(DriveError, match="the buffer ran dry"):
+            _until(lambda: parts.append(link.feedback()) or False)
+        _until(lambda: parts.append(link.feedback()) or link.state is LinkState.FAULT)
+        feedback_ = joined([part for part in parts if len(part)])
+        assert (np.diff(feedback_.tick) == 1).all()
+        assert np.abs(np.diff(feedback_.setpoint[-2:], axis=0)).max() <= link.resolution
+        report = far.end()
+    assert report["pressure_raw"] == 0
+
+
+def test_host_that_dies_leaves_the_machine_at_rest(tmp_path):
+    """SIGKILL of the feeding process: its sender stops on the path and ends by itself."""
+    far = Far(tmp_path)
+    script = (
+        "import sys, time, numpy as np\n"
+        f"sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+        "from pathlib import Path\n"
+        "from trajectories import run_of\n"
+        "from test_sender import PATIENT\n"
+        "from cdhr_host.drives.sender import SenderLink\n"
+        "if __name__ == '__main__':\n"
+        f"    link = SenderLink({far.url!r}, PATIENT, Path({str(tmp_path / 'r.json')!r}))\n"
+        "    link.open(); link.arm(np.zeros(6)); rows = run_of(3000, seed=5)\n"
+        "    link.feed(rows[: link.free])\n"
+        "    print(link.pid, flush=True)\n"
+        "    time.sleep(60)\n"
+    )
+    path = tmp_path / "feeder.py"
+    path.write_text(script)
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    host = subprocess.Popen([sys.executable, str(path)], stdout=subprocess.PIPE, env=environment)
+    assert select.select([host.stdout], [], [], 30.0)[0]
+    sender = int(host.stdout.readline())
+    time.sleep(0.5)
+    host.kill()
+    host.wait()
+    host.stdout.close()
+    _until(lambda: not Path(f"/proc/{sender}").exists() or _zombie(sender))
+    report = far.end()
+    assert report["at_rest"]
+    assert report["pressure_raw"] == 0
+    assert set(report["states"]) == {"switch_on_disabled"}
+
+
+def _zombie(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(") ", 1)[1].startswith("Z")
+    except FileNotFoundError:
+        return True
