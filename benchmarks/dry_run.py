@@ -1,6 +1,6 @@
 """A dry run of a long file: times real time, and memory that does not grow with the file.
 
-    python benchmarks/dry_run.py [--lines 100000] [--runs 3]
+python benchmarks/dry_run.py [--lines 100000] [--runs 3]
 """
 
 import argparse

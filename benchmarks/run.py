@@ -1,6 +1,6 @@
 """Every benchmark of this folder in turn.
 
-    python benchmarks/run.py --smoke     each on little input, to see that it still runs
+python benchmarks/run.py --smoke     each on little input, to see that it still runs
 """
 
 import argparse
@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
-HELPERS = {"run", "measure", "programs", "paths"}
+HELPERS = {"run", "measure", "programs", "paths", "yardstick"}
 
 
 def main() -> None:

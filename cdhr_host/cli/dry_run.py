@@ -7,7 +7,7 @@ import typer
 
 from cdhr_host.cli.machine import check_log, open_machine
 from cdhr_host.cli.options import Json, LogPath, ProfileName, examples
-from cdhr_host.cli.proving import proven, tell_problems
+from cdhr_host.cli.proving import LogWish, proven, tell_problems
 from cdhr_host.cli.refusals import Refusal, about, emit
 from cdhr_host.cli.source import Source
 
@@ -15,6 +15,7 @@ EXAMPLES = examples(
     "cdhr dry-run gcode/paper_ring_double.gcode",
     "cdhr dry-run vase.gcode.gz --profile paper-wide --log vase.parquet",
     "cdhr dry-run part.gcode --rate 1000 --log part.csv",
+    "cdhr dry-run vase.gcode --rate 1000 --log vase.parquet --compact",
     "cdhr generate ring | cdhr dry-run - --json",
 )
 
@@ -24,12 +25,17 @@ def dry_run(
         str,
         typer.Argument(metavar="FILE", help="The G-code; may be gzip-compressed; - reads standard input."),
     ],
+    *,
     profile: ProfileName = "paper",
     log: LogPath = None,
     rate: Annotated[
         float | None,
         typer.Option(metavar="HZ", help="Rows a second; the drives' rate when left out.", min=10, max=10000),
     ] = None,
+    compact: Annotated[
+        bool,
+        typer.Option("--compact", help="A small Parquet log: whole tenths of a micrometre, no forces."),
+    ] = False,
     json_: Json = False,
 ) -> None:
     """Prove a program without drives: every limit at every tick, time, extremes, and the setpoint log."""
@@ -38,10 +44,10 @@ def dry_run(
 
     source = Source(file)
     machine = open_machine(profile)
-    check_log(log)
+    check_log(log, compact=compact)
     try:
         with about(source.name):
-            proof = proven(source, machine, rate=rate, log=log)
+            proof = proven(source, machine, rate=rate, log=LogWish(log, compact) if log else None)
     except Refusal as refusal:
         if json_ and isinstance(refusal.__cause__, ProgramError):
             emit(json.dumps(refused_record(refusal.__cause__, source.name, profile)))

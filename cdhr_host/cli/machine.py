@@ -31,13 +31,14 @@ def opened(drives: str, machine: "Profile", speed: float) -> "tuple[MachineLink,
     return open_link(drives, machine, clock), clock
 
 
-def check_log(log: Path | None) -> None:
+def check_log(log: Path | None, *, compact: bool = False) -> None:
     """Refuse a log that could not be written, before any work."""
     if log is None:
         return
-    from cdhr_host.report.log import LogTargetError, check_target
+    from cdhr_host.report import compact as packed
+    from cdhr_host.report.log import WRITERS, LogTargetError, check_target
 
     try:
-        check_target(log)
+        check_target(log, packed.WRITERS if compact else WRITERS)
     except LogTargetError as error:
         raise Refusal(f"cdhr: error: --log {log}: {error}") from error

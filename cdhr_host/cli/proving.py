@@ -1,8 +1,10 @@
 """The whole file is proven before anything moves: what ``dry-run`` and ``stream`` share."""
 
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cdhr_host.cli.progress import Progress, clock_text
 from cdhr_host.cli.refusals import problem_lines, say, writing
@@ -11,33 +13,57 @@ from cdhr_host.cli.source import Source
 if TYPE_CHECKING:
     from cdhr_host.pipeline import Proof
     from cdhr_host.profile import Profile
+    from cdhr_host.report.log import Log
     from cdhr_host.values import Setpoints
 
 
+@dataclass(frozen=True, slots=True)
+class LogWish:
+    """The log a dry run is to write."""
+
+    path: Path
+    compact: bool = False
+
+
 def proven(
-    source: Source, machine: "Profile", *, rate: float | None = None, log: Path | None = None
+    source: Source, machine: "Profile", *, rate: float | None = None, log: LogWish | None = None
 ) -> "Proof":
     """Walk the staircase once without drives; the log is kept only when all is well.
 
     Raises ProgramError for a program that is not understood.
     """
     from cdhr_host.pipeline import prove
-    from cdhr_host.report.log import SetpointLog
 
-    with writing(log) if log else nullcontext(), SetpointLog(log) if log else nullcontext() as out:
-        with Progress("checking") as progress:
+    with _log(log, machine, rate) as (out, takes), Progress("checking") as progress:
 
-            def watch(block: "Setpoints") -> None:
-                if len(block):
-                    progress.show(
-                        source.fraction, f"line {block.line[-1]}  {clock_text(block.t[-1])} of motion"
-                    )
+        def watch(block: "Setpoints") -> None:
+            if len(block):
+                progress.show(source.fraction, f"line {block.line[-1]}  {clock_text(block.t[-1])} of motion")
 
-            sink = out.add_setpoints if out is not None else None
-            proof = prove(source.chunks(), machine, rate_hz=rate, sink=sink, watch=watch)
+        proof = prove(source.chunks(), machine, rate_hz=rate, watch=watch, **takes)
         if out is not None and proof.ok:
             out.keep()
     return proof
+
+
+@contextmanager
+def _log(
+    wish: LogWish | None, machine: "Profile", rate: float | None
+) -> "Iterator[tuple[Log | None, dict[str, Any]]]":
+    """The log, if there is to be one, and what of the proof it takes."""
+    if wish is None:
+        yield None, {}
+        return
+    from cdhr_host.report.compact import CompactLog
+    from cdhr_host.report.log import SetpointLog
+
+    with writing(wish.path):
+        if wish.compact:
+            with CompactLog(wish.path, machine.drives.period if rate is None else 1.0 / rate) as small:
+                yield small, {"trace": small.add_trace}
+        else:
+            with SetpointLog(wish.path) as full:
+                yield full, {"sink": full.add_setpoints}
 
 
 def tell_problems(proof: "Proof", source: Source) -> None:

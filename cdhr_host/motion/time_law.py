@@ -27,7 +27,7 @@ class TimeLaw:
         """(N,) s -> s, s', s'' (N,) each."""
         piece = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, len(self.t) - 1)
         x = t - self.t[piece]
-        s, v, a, j = self.state[:, piece]
+        s, v, a, j = (row[piece] for row in self.state)
         return (
             s + x * (v + x * (a / 2 + x * (j / 6))),
             v + x * (a + x * (j / 2)),

@@ -124,14 +124,19 @@ def on_bed(position_G: Array, profile: Profile) -> Flags:
 
 
 class Audit:
-    """Checks blocks in order; a line that breaks a limit is told once for each cable or slider."""
+    """Checks blocks in order; a line that breaks a limit is told for each cable or slider.
+
+    It is told again when a later block finds the same line worse, with the same ``key``.
+    """
 
     def __init__(self, profile: Profile) -> None:
         self._profile = profile
         forces = profile.forces
         self._least = np.repeat([forces.lower_min, forces.upper_min], 3)
         self._greatest = np.repeat([forces.lower_max, forces.upper_max], 3)
-        self._told: dict[tuple[_Rule, int], int] = {}
+        self._told: dict[tuple[_Rule, int], tuple[int, float]] = {}
+        self.total = 0
+        """lines, limits and cables told so far"""
 
     def places(self, track: ToolTrack) -> list[Problem]:
         """What of a track leaves the bed."""
@@ -173,9 +178,12 @@ class Audit:
             heads = np.flatnonzero(np.diff(line[rows], prepend=-1))
             worst = sign * np.maximum.reduceat(sign * values[rows, i], heads)
             for at, value in zip(line[rows[heads]].tolist(), worst.tolist(), strict=True):
-                if self._told.get((rule, i)) != at:
-                    self._told[rule, i] = at
-                    yield _problem(rule, at, i, value, float(bound[i]))
+                told_line, told = self._told.get((rule, i), (-1, value))
+                if told_line == at and sign * value <= sign * told:
+                    continue
+                self._told[rule, i] = at, value
+                self.total += told_line != at
+                yield _problem(rule, at, i, value, float(bound[i]))
 
 
 def _problem(rule: _Rule, line: int, i: int, value: float, limit: float) -> Problem:
@@ -184,7 +192,10 @@ def _problem(rule: _Rule, line: int, i: int, value: float, limit: float) -> Prob
     while f"{value:.{digits}f}" == f"{limit:.{digits}f}" and digits < 9:
         digits += 1
     message = rule.what.format(i=i + 1, value=f"{value:.{digits}f}", limit=f"{limit:g}")
-    return Problem(rule.kind, message, line=line, value=value, limit=limit, unit=rule.unit, hint=rule.hint)
+    key = f"{rule.kind} {i + 1} {'most' if rule.upper else 'least'}"
+    return Problem(
+        rule.kind, message, line=line, key=key, value=value, limit=limit, unit=rule.unit, hint=rule.hint
+    )
 
 
 def _by_line(problem: Problem) -> int:

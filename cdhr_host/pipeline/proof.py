@@ -13,6 +13,7 @@ from cdhr_host.motion.sampling import Timed
 from cdhr_host.pipeline.columns import setpoint_columns
 from cdhr_host.pipeline.staircase import Checked, Staircase
 from cdhr_host.pipeline.survey import Survey
+from cdhr_host.pipeline.trace import Trace, Tracer
 from cdhr_host.profile import Profile
 from cdhr_host.values import (
     Arc,
@@ -66,30 +67,34 @@ def prove(
     *,
     rate_hz: float | None = None,
     sink: Callable[[Setpoints], None] | None = None,
+    trace: Callable[[Trace], None] | None = None,
     watch: Callable[[Setpoints], None] | None = None,
 ) -> Proof:
     """Walk a program's text once, in memory that does not grow with it.
 
     ``sink`` gets every setpoint, in blocks, as long as there is no problem. Without it only
     the setpoints are computed that prove the others (see ``survey``); the extremes are then
-    theirs. ``watch`` gets the blocks that are computed, to show progress. Raises
-    ProgramError for text that is not understood; what the machine cannot do is listed in
-    the proof instead.
+    theirs. ``trace`` gets every tick without its forces. ``watch`` gets the blocks that are
+    computed, to show progress. Raises ProgramError for text that is not understood; what the
+    machine cannot do is listed in the proof instead.
     """
     staircase = Staircase(profile, rate_hz=rate_hz)
     chosen = Survey(profile).tracks if sink is None else Timed.tracks
-    tally = _Tally()
+    tracer, tally = Tracer(profile), _Tally()
     for step in staircase.timed(chunks):
         if not isinstance(step, Timed):
             tally.command(step)
             continue
         for checked in map(staircase.checked, chosen(step)):
             tally.block(checked)
-            if sink is not None and not tally.total:
+            if sink is not None and not staircase.problems:
                 sink(checked.setpoints)
             if watch is not None:
                 watch(checked.setpoints)
-    return tally.proof(staircase.lines)
+        if trace is not None and not staircase.problems:
+            for track in step.tracks():
+                trace(tracer.trace(track))
+    return tally.proof(staircase)
 
 
 @dataclass(slots=True)
@@ -101,16 +106,17 @@ class _Tally:
     extruded: float = 0.0
     duration: float = 0.0
     pauses: int = 0
-    total: int = 0
-    problems: list[Problem] = field(default_factory=list)
+    problems: dict[tuple[int | None, str | None], Problem] = field(default_factory=dict)
     layers: list[tuple[int, int]] = field(default_factory=list)
     warnings: list[Problem] = field(default_factory=list)
     extremes: dict[str, Extreme] = field(default_factory=dict)
 
     def block(self, checked: Checked) -> None:
         """Take in a block of setpoints."""
-        self.total += len(checked.problems)
-        self.problems.extend(checked.problems[: MAX_LISTED - len(self.problems)])
+        for problem in checked.problems:
+            place = problem.line, problem.key
+            if place in self.problems or len(self.problems) < MAX_LISTED:
+                self.problems[place] = problem
         rows = checked.setpoints
         if not len(rows):
             return
@@ -171,16 +177,16 @@ class _Tally:
     def _(self, _: Dwell | Stop | Blend) -> None:
         """Adds nothing of its own; its time is in the setpoints."""
 
-    def proof(self, lines: int) -> Proof:
+    def proof(self, staircase: Staircase) -> Proof:
         """All of it."""
         return Proof(
-            lines=lines,
+            lines=staircase.lines,
             moves=self.moves,
             duration=self.duration,
             path=self.path,
             extruded=self.extruded,
-            problems=tuple(self.problems),
-            total_problems=self.total,
+            problems=tuple(self.problems.values()),
+            total_problems=staircase.problems,
             extremes=self.extremes,
             layers=tuple(self.layers),
             pauses=self.pauses,

@@ -50,6 +50,11 @@ class Staircase:
         return self._interpreter.lines
 
     @property
+    def problems(self) -> int:
+        """Lines, limits and cables of the current text that were told as problems."""
+        return self._audit.total
+
+    @property
     def modal(self) -> Modal:
         """What the next line inherits from those read so far."""
         return self._interpreter.modal

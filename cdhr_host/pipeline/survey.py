@@ -8,17 +8,23 @@ enough to find its extremes; where they do not, every tick is looked at:
 * the bed: a cylinder is convex and the smoothed path a weighted mean of drawn points, so a
   leg whose drawn points are all inside stays inside;
 * slider travel: a cable's length changes by at most the way of the nozzle;
-* cable forces: f = f0(q) + B(q) a with |a| bounded over the leg. Between two samples f0
-  departs from the straight line between its values by at most d²/8 times its second
-  derivative along the path; for d = SPACING and cables of half a metre and more that is far
-  below FORCE_MARGIN.
+* cable forces: f = f0(q) + B(q) a with |a| bounded over the leg, and f0 changes by at most
+  ``force_slope`` for each metre; no place is further than half of SPACING from a sample.
 """
 
 from collections.abc import Iterator
 
 import numpy as np
 
-from cdhr_host.mechanism import Cables, Loads, affine_tensions, direction_change_bound, lengths, slider
+from cdhr_host.mechanism import (
+    Cables,
+    Loads,
+    affine_tensions,
+    direction_change_bound,
+    lengths,
+    slider,
+    tension_slopes,
+)
 from cdhr_host.motion.bounds import LegBounds, leg_bounds
 from cdhr_host.motion.leg import Leg
 from cdhr_host.motion.sampling import BLOCK, Stand, Timed
@@ -28,8 +34,10 @@ from cdhr_host.values import Array, Flags, Ints, ToolTrack
 
 SPACING = 2e-3
 """m along the path"""
-FORCE_MARGIN = 2e-3
-"""N kept from the force windows between samples"""
+GRID = (9, 7, 9)
+"""places in radius, azimuth and height at which the slope of the forces is evaluated"""
+STEEPER = 1.2
+"""how much steeper than at any of these places the forces may be in between"""
 
 
 class Survey:
@@ -40,9 +48,9 @@ class Survey:
         self._cables = Cables.from_profile(profile)
         self._loads = Loads.from_profile(profile)
         self._bend = direction_change_bound(profile)
-        forces = profile.forces
-        self._least = np.repeat([forces.lower_min, forces.upper_min], 3) + FORCE_MARGIN
-        self._greatest = np.repeat([forces.lower_max, forces.upper_max], 3) - FORCE_MARGIN
+        forces, margin = profile.forces, force_slope(profile) * SPACING / 2
+        self._least = np.repeat([forces.lower_min, forces.upper_min], 3) + margin
+        self._greatest = np.repeat([forces.lower_max, forces.upper_max], 3) - margin
 
     def tracks(self, timed: Timed) -> Iterator[ToolTrack]:
         """Samples of a stretch that prove all of it, in blocks."""
@@ -90,6 +98,20 @@ class Survey:
         pulled = (low >= self._least) & (high <= self._greatest)
         held = (travel >= sliders.travel_min + SPACING) & (travel <= sliders.travel_max - SPACING)
         return np.asarray((pulled & held).all(axis=1), dtype=np.bool_)
+
+
+def force_slope(profile: Profile) -> float:
+    """N/m: the most a resting cable force changes for each metre of nozzle travel on the bed."""
+    bed, cables = profile.bed, Cables.from_profile(profile)
+    radius, azimuth, height = np.meshgrid(
+        np.linspace(0.0, bed.radius, GRID[0]),
+        np.linspace(0.0, 2 * np.pi / 3, GRID[1]),
+        np.linspace(0.0, bed.height, GRID[2]),
+    )
+    places = np.stack((radius * np.cos(azimuth), radius * np.sin(azimuth), height), axis=-1).reshape(-1, 3)
+    q = places - cables.reference_G
+    by_lower, by_upper = tension_slopes(cables, Loads.from_profile(profile), q, q)
+    return STEEPER * float(_row_norms(by_lower + by_upper).max())
 
 
 def _row_norms(gain: Array) -> Array:

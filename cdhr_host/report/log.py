@@ -1,7 +1,7 @@
 """Logs on disk: CSV or Parquet by suffix, written as the rows come, visible only when complete."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import BinaryIO, Protocol, Self
@@ -21,14 +21,19 @@ class LogTargetError(ValueError):
     """A log cannot be written there; the message says why and what would do."""
 
 
-def _type(name: str) -> pa.DataType:
-    return pa.int64() if name == "line" or name.endswith("_counts") else pa.float64()
+def _schema(names: Sequence[str]) -> pa.Schema:
+    whole = {name for name in names if name == "line" or name.endswith("_counts")}
+    return pa.schema([(name, pa.int64() if name in whole else pa.float64()) for name in names])
 
 
-class _Writer(Protocol):
-    def write(self, table: pa.Table) -> None: ...
+class Writer(Protocol):
+    """One kind of file."""
 
-    def close(self) -> None: ...
+    def write(self, table: pa.Table) -> None:
+        """Append rows."""
+
+    def close(self) -> None:
+        """Write what ends the file."""
 
 
 class _Csv:
@@ -61,13 +66,13 @@ class _Parquet:
         self._writer.close()
 
 
-WRITERS: dict[str, Callable[[BinaryIO, pa.Schema], _Writer]] = {".csv": _Csv, ".parquet": _Parquet}
+WRITERS: dict[str, Callable[[BinaryIO, pa.Schema], Writer]] = {".csv": _Csv, ".parquet": _Parquet}
 
 
-def check_target(path: Path) -> None:
+def check_target(path: Path, writers: Mapping[str, object] = WRITERS) -> None:
     """Refuse a log that could not be written there, before any work is done; raises LogTargetError."""
-    if path.suffix not in WRITERS:
-        known = " or ".join(WRITERS)
+    if path.suffix not in writers:
+        known = " or ".join(writers)
         raise LogTargetError(f"'{path.name}' does not end in {known}: the suffix says which kind to write")
     if path.exists() and not path.is_file():
         raise LogTargetError(f"{path} is not a regular file")
@@ -80,20 +85,25 @@ def check_target(path: Path) -> None:
 class Log:
     """A log being written beside its target; ``keep`` puts it in place, leaving without it drops it.
 
-    A context manager. Rows are columns of equal length, in the order of ``names``. Memory
-    is bounded by ROW_GROUP rows. Raises LogTargetError at construction, OSError when the disk
+    A context manager. Rows are columns of equal length, of the names and types of the schema.
+    Memory is bounded by ROW_GROUP rows. Raises LogTargetError at construction, OSError when the disk
     refuses.
     """
 
-    def __init__(self, path: Path, names: Sequence[str] = SETPOINT_COLUMNS) -> None:
-        check_target(path)
+    def __init__(
+        self,
+        path: Path,
+        schema: pa.Schema,
+        writers: Mapping[str, Callable[[BinaryIO, pa.Schema], Writer]] = WRITERS,
+    ) -> None:
+        check_target(path, writers)
         self._path = path
         self._part = path.with_name(f".{path.name}.{os.getpid()}.part")
-        self._schema = pa.schema([(name, _type(name)) for name in names])
+        self._schema = schema
         self._held: list[pa.RecordBatch] = []
         self._rows = 0
         self._file: BinaryIO = self._part.open("wb")
-        self._writer: _Writer = WRITERS[path.suffix](self._file, self._schema)
+        self._writer: Writer = writers[path.suffix](self._file, self._schema)
 
     def add(self, columns: dict[str, Column]) -> None:
         """Append rows: {column: (N,)}."""
@@ -133,7 +143,7 @@ class SetpointLog(Log):
     """The setpoints of a dry run, one row a tick."""
 
     def __init__(self, path: Path) -> None:
-        super().__init__(path, SETPOINT_COLUMNS)
+        super().__init__(path, _schema(SETPOINT_COLUMNS))
 
     def add_setpoints(self, setpoints: Setpoints) -> None:
         """Append N ticks."""
@@ -144,7 +154,7 @@ class RunLog(Log):
     """What was sent and what came back, one row an executed tick."""
 
     def __init__(self, path: Path) -> None:
-        super().__init__(path, SETPOINT_COLUMNS + FEEDBACK_COLUMNS)
+        super().__init__(path, _schema(SETPOINT_COLUMNS + FEEDBACK_COLUMNS))
 
     def add_run(self, setpoints: Setpoints, feedback: Feedback) -> None:
         """Append N executed ticks."""

@@ -12,7 +12,7 @@ from cdhr_host.motion.bounds import leg_bounds
 from cdhr_host.motion.leg import Leg
 from cdhr_host.motion.sampling import Timed
 from cdhr_host.pipeline import Staircase, open_profile, prove
-from cdhr_host.pipeline.survey import FORCE_MARGIN, SPACING, Survey, _refined
+from cdhr_host.pipeline.survey import Survey, _refined, force_slope
 
 PAPER = open_profile("paper")
 POINT = st.tuples(st.integers(-330, 330), st.integers(-330, 330), st.integers(0, 120))
@@ -35,7 +35,7 @@ def test_problems_are_those_of_every_setpoint(points):
     quick = prove([program], PAPER)
     full = prove([program], PAPER, sink=lambda _: None)
     assert quick.total_problems == full.total_problems
-    assert quick.problems == full.problems
+    assert set(quick.problems) == set(full.problems)
     assert quick.duration == full.duration
 
 
@@ -56,21 +56,21 @@ def test_bounds_hold_at_every_tick(points, feed):
         assert found.jerk <= PAPER.limits.jerk_max * (1 + 1e-9)
 
 
-def test_resting_force_between_samples_stays_within_the_margin():
-    """Random straight ways of SPACING over the bed of the tightest geometry."""
+@pytest.mark.parametrize("name", ["paper", "paper-wide", "paper-simulation"])
+def test_resting_forces_are_nowhere_steeper_than_stated(name):
+    """Random short ways over the bed."""
+    profile = open_profile(name)
     rng = np.random.default_rng(1)
-    cables, loads = Cables.from_profile(PAPER), Loads.from_profile(PAPER)
-    count = 4000
-    radius, angle = PAPER.bed.radius * np.sqrt(rng.random(count)), rng.random(count) * 2 * math.pi
-    start = np.column_stack(
-        (radius * np.cos(angle), radius * np.sin(angle), rng.random(count) * PAPER.bed.height)
-    )
+    cables, loads = Cables.from_profile(profile), Loads.from_profile(profile)
+    count, step = 20_000, 1e-6
+    radius, angle = profile.bed.radius * np.sqrt(rng.random(count)), rng.random(count) * 2 * math.pi
+    height = rng.random(count) * profile.bed.height
+    start = np.column_stack((radius * np.cos(angle), radius * np.sin(angle), height))
     way = rng.normal(size=(count, 3))
-    way *= SPACING / np.linalg.norm(way, axis=1)[:, None]
-    low, middle, high = (
-        affine_tensions(cables, loads, start + u * way, start + u * way).rest for u in (0.0, 0.5, 1.0)
-    )
-    assert np.abs(middle - (low + high) / 2).max() < FORCE_MARGIN / 10
+    way *= step / np.linalg.norm(way, axis=1)[:, None]
+    before, after = (affine_tensions(cables, loads, q, q).rest for q in (start, start + way))
+    steepest = np.abs(after - before).max() / step
+    assert 0.5 * force_slope(profile) < steepest <= force_slope(profile)
 
 
 def test_only_doubtful_intervals_are_refined():
