@@ -19,7 +19,8 @@ real one is ``outer``. Eq. (24)-(25) leave open which pose is "o"; ``weight`` is
 The integral is frozen while any cable is at its bound.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 
@@ -29,6 +30,9 @@ from cdhr_host.control.protocol import Action, Mode, Plan, Seen
 from cdhr_host.profile import Profile
 from cdhr_host.units import MM
 from cdhr_host.values import Array
+
+UPRIGHT: Final = np.array([False, False, True] * 2)
+"""the vertical ones of six coordinates"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +52,12 @@ class Gains:
     integral: float = 0.0
     """1/s²: ci"""
     weight: float | None = None
-    """of the vertical when forces are optimised; None clips each cable"""
+    """of the vertical when forces are optimised inside their windows; None clips each cable"""
+    vertical: bool = False
+    """Eq. (24)-(25) as one may read them: the vertical acceleration of F_v restored after clipping,
+    whatever that does to the windows"""
+    auxiliary: bool = True
+    """feed l1 and l2 back; without them nothing is left of the windup protection"""
     at_plan: bool = False
     """take J and F_k at the planned pose: less delay margin, several times less noise"""
 
@@ -99,7 +108,7 @@ class Prescribed:
         self._high = np.repeat([window.lower_max, window.upper_max], 3)
 
     def start(self) -> PrescribedState:
-        """At rest."""
+        """At rest, nothing integrated."""
         return PrescribedState(np.zeros(6), np.zeros(6), np.zeros(6))
 
     def step(
@@ -107,6 +116,9 @@ class Prescribed:
     ) -> tuple[PrescribedState, Action]:
         """Forces for the next ``dt`` s; raises MotionError out of reach."""
         law = self.law(state, plan, seen)
+        if not self.gains.auxiliary:
+            total = state.total if law.saturated else state.total + dt * law.error
+            return replace(state, total=total), Action(Mode.CLOSED, tension=law.given)
         lag_rate = state.lag_rate + dt * law.lag_rate_slope
         lag = state.lag + dt * (lag_rate - self.gains.lag * state.lag)
         total = state.total if law.saturated else state.total + dt * law.error
@@ -132,6 +144,10 @@ class Prescribed:
         short = equations.pull @ (given - wanted) / equations.mass
         return Law(error, surface, wanted, given, lag_slope, short - g.lag_rate * state.lag_rate)
 
+    def at_bound(self, tension: Array) -> bool:
+        """(6,) N -> whether a cable is at or beyond its window."""
+        return bool(((tension <= self._low) | (tension >= self._high)).any())
+
     def _switched(self, surface: Array) -> Array:
         if self.gains.layer == 0.0:
             return np.sign(surface)
@@ -139,8 +155,13 @@ class Prescribed:
 
     def _inside(self, equations: Equations, wanted: Array) -> Array:
         clipped = np.clip(wanted, self._low, self._high)
+        if (clipped == wanted).all():
+            return clipped
+        if self.gains.vertical:
+            kept, asked = equations.acceleration(clipped), equations.acceleration(wanted)
+            return equations.tension(np.where(UPRIGHT, asked, kept))
         weight = self.gains.weight
-        if weight is None or (clipped == wanted).all():
+        if weight is None:
             return clipped
         parts = slice(0, 3), slice(3, 6)
         return np.concatenate(

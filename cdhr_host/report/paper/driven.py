@@ -14,7 +14,7 @@ from cdhr_host.plant.bodies import Bodies, BodiesState, Build, Forces
 from cdhr_host.plant.strands import Strands
 from cdhr_host.plant.turning import Turn
 from cdhr_host.profile import Profile
-from cdhr_host.report.paper.items import Cell, Effort, Item, Panel, cells
+from cdhr_host.report.paper.items import Cell, Item, Panel, Study, cells
 from cdhr_host.units import MM
 from cdhr_host.values import Array
 
@@ -149,9 +149,9 @@ READINGS = (
 """printed, set-up, study, reading, tolerance as a share"""
 
 
-def errors(effort: Effort, profiles: dict[str, Profile]) -> Item:
+def errors(study: Study) -> Item:
     """Fig. 7: errors of the platform under prescribed forces."""
-    profile = profiles["paper-simulation"]
+    profile = study.profiles["paper-simulation"]
     held = driven(profile, Drive(PULLEYS["swivel"], held=HELD_STEP))
     found = _close(
         held.worst, "0.003 0.005 0.035", "0.0044 0.0046 0.0008", "compensated, forces held 1 ms", 0.1
@@ -171,9 +171,9 @@ def errors(effort: Effort, profiles: dict[str, Profile]) -> Item:
     )
 
 
-def spring(effort: Effort, profiles: dict[str, Profile]) -> Item:
+def spring(study: Study) -> Item:
     """Fig. 8: force of the spring under prescribed forces without compensation."""
-    profile = profiles["paper-simulation"]
+    profile = study.profiles["paper-simulation"]
     run = driven(profile, Drive(PULLEYS["point"]))
     rows = slice(0, len(run.t))
     parts = spring_force(
@@ -198,9 +198,9 @@ def spring(effort: Effort, profiles: dict[str, Profile]) -> Item:
     )
 
 
-def undistributed(effort: Effort, profiles: dict[str, Profile]) -> Item:
+def undistributed(study: Study) -> Item:
     """Fig. 10: both cables of a pair pull alike."""
-    run = driven(profiles["paper-simulation"], Drive(PULLEYS["swivel"], build=Build(), alike=True))
+    run = driven(study.profiles["paper-simulation"], Drive(PULLEYS["swivel"], build=Build(), alike=True))
     found = _close(
         run.worst, "19.361 19.041 9.682", "1.736 1.561 0.561", "f/2 each, six degrees of freedom", 0.01
     )
@@ -220,13 +220,13 @@ def undistributed(effort: Effort, profiles: dict[str, Profile]) -> Item:
     )
 
 
-def distributed(effort: Effort, profiles: dict[str, Profile]) -> Item:
+def distributed(study: Study) -> Item:
     """Fig. 11: forces shared by Eq. (14)."""
     found: tuple[Cell, ...] = ()
     panels = []
     studies = ((HELD_STEP, "0.0044 0.0046 0.0008"), (2.0 * HELD_STEP, "0.009 0.009 0.002"))
     for held, expected in studies:
-        run = driven(profiles["paper-simulation"], Drive(PULLEYS["swivel"], build=Build(), held=held))
+        run = driven(study.profiles["paper-simulation"], Drive(PULLEYS["swivel"], build=Build(), held=held))
         reading = f"shared by Eq. (14), forces held {held * 1e3:g} ms"
         found += _close(run.worst, "0.010 0.012 0.035", expected, reading, 0.15)
         found += _turned(run, "0.001 0.001 0.001", "0 0 0", 0.0)

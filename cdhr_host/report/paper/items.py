@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from cdhr_host.profile import Profile
 from cdhr_host.values import Array
 
 
@@ -59,11 +60,14 @@ class Item:
 
 
 @dataclass(frozen=True, slots=True)
-class Effort:
-    """How much is run: everything, or what a test has time for."""
+class Study:
+    """The machines, and how much is run: everything, or what a test has time for."""
 
+    profiles: Mapping[str, Profile]
+    """by name: paper and paper-simulation"""
     seeds: int = 5
     thorough: bool = True
+    """slow readings too, and the experiments to their end"""
 
 
 def cells(

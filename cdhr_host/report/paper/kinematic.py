@@ -6,8 +6,7 @@ from cdhr_host.mechanism import Cables, Loads, forward, lengths, trajectories, u
 from cdhr_host.mechanism.kinematics import components
 from cdhr_host.mechanism.pulley import PULLEYS
 from cdhr_host.mechanism.statics import spring_force
-from cdhr_host.profile import Profile
-from cdhr_host.report.paper.items import Cell, Effort, Item, Panel, cells
+from cdhr_host.report.paper.items import Cell, Item, Panel, Study, cells
 from cdhr_host.units import MM
 from cdhr_host.values import Array
 
@@ -22,10 +21,10 @@ STUDY = {
 PRINTED = "0.669 0.636 0.855"
 
 
-def errors(effort: Effort, profiles: dict[str, Profile]) -> Item:
+def errors(study: Study) -> Item:
     """Fig. 5: errors of both platforms with and without compensation."""
     t, q = _samples()
-    base = Cables.from_profile(profiles["paper-simulation"])
+    base = Cables.from_profile(study.profiles["paper-simulation"])
     found: list[Cell] = []
     curves: dict[str, Array] = {}
     for model, expected in STUDY.items():
@@ -63,10 +62,10 @@ def errors(effort: Effort, profiles: dict[str, Profile]) -> Item:
     )
 
 
-def spring(effort: Effort, profiles: dict[str, Profile]) -> Item:
+def spring(study: Study) -> Item:
     """Fig. 6: force of the spring with and without compensation."""
     t, q = _samples()
-    profile = profiles["paper-simulation"]
+    profile = study.profiles["paper-simulation"]
     cables, loads = Cables.from_profile(profile), Loads.from_profile(profile)
     off = uncompensated_error(cables, q, q)
     without = _force(loads, q + off[0], q + off[1])
