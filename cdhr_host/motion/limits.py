@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdhr_host.errors import MotionError, Problem
+from cdhr_host.motion.shaping import Shaper, shaper
 from cdhr_host.motion.smooth_path import SmoothPath
 from cdhr_host.profile import Profile
 from cdhr_host.units import MM
@@ -47,6 +48,24 @@ def _too_slow_sliders(speed: float) -> Problem:
     )
 
 
+def _too_slow_mode(deviation: float, profile: Profile) -> Problem:
+    rules = profile.path
+    return Problem(
+        "unplannable",
+        f"shaping a mode of {rules.shaper_frequency:g} Hz leaves the path by up to {deviation / MM:.3f} mm, "
+        f"more than half of the tolerance of {rules.tolerance / MM:g} mm",
+        key="path.shaper_frequency_hz",
+        value=rules.shaper_frequency,
+        hint="widen path.tolerance_mm, lower limits.acceleration_max_mm_s2, or use a shorter shaper (zv)",
+    )
+
+
+def profile_shaper(profile: Profile) -> Shaper:
+    """The input shaper of a profile's [path]."""
+    rules = profile.path
+    return shaper(rules.shaper, rules.shaper_frequency, rules.shaper_damping)
+
+
 @dataclass(frozen=True, slots=True)
 class MotionLimits:
     """Bounds on the nozzle, with the sliders' folded in, and the smoothing that goes with them."""
@@ -61,6 +80,8 @@ class MotionLimits:
     """m, of the smoothing kernel"""
     stop_angle: float
     """rad, a corner turning more than this is an exact stop"""
+    shaped: float = 0.0
+    """m, the part of every tolerance that input shaping needs"""
 
     @classmethod
     def from_profile(cls, profile: Profile, bend: float) -> "MotionLimits":
@@ -77,11 +98,15 @@ class MotionLimits:
         j = min(limits.jerk_max, sliders.jerk_max - 3 * bend * v * a - 6 * bend**2 * v**3)
         if a <= 0.0 or j <= 0.0:
             raise MotionError(_too_slow_sliders(v))
-        return cls(v, a, j, half_width(profile.path.tolerance), profile.path.stop_angle)
+        shaped = profile_shaper(profile).deviation(a)
+        if shaped > profile.path.tolerance / 2:
+            raise MotionError(_too_slow_mode(shaped, profile))
+        smoothed = half_width(profile.path.tolerance - shaped)
+        return cls(v, a, j, smoothed, profile.path.stop_angle, shaped)
 
     def within(self, tolerance: float) -> "MotionLimits":
         """The same limits with the smoothing that a tolerance (m) allows."""
-        return replace(self, half_width=half_width(tolerance))
+        return replace(self, half_width=half_width(max(tolerance - self.shaped, tolerance / 2)))
 
 
 def half_width(tolerance: float) -> float:

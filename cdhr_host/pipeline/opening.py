@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from cdhr_host.errors import MotionError, Problem, ProfileError
 from cdhr_host.mechanism import direction_change_bound, inconsistencies
 from cdhr_host.motion.limits import MotionLimits
-from cdhr_host.profile import Profile, find, read_table, validate
+from cdhr_host.profile import Profile, described, find, read_table, validate
 
 
 def open_profile(name_or_path: str) -> Profile:
@@ -40,7 +40,6 @@ def _contradictions(profile: Profile) -> Iterator[tuple[frozenset[str], Problem]
     try:
         MotionLimits.from_profile(profile, direction_change_bound(profile))
     except MotionError as error:
-        keys = frozenset(
-            {"limits.speed_max_mm_s", "sliders.acceleration_max_mm_s2", "sliders.jerk_max_mm_s3"}
-        )
+        sections = ("limits", "sliders", "path")
+        keys = frozenset(f"{section}.{key}" for section, key, *_ in described(profile) if section in sections)
         yield keys, error.problems[0]

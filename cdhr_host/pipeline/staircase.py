@@ -9,7 +9,7 @@ import numpy as np
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.extrusion import air_command
 from cdhr_host.mechanism import Cables, Loads, cable_state, direction_change_bound, slider
-from cdhr_host.motion.limits import MotionLimits
+from cdhr_host.motion.limits import MotionLimits, profile_shaper
 from cdhr_host.motion.planner import Planner
 from cdhr_host.motion.sampling import Timed, Timeline
 from cdhr_host.pipeline.audit import Audit, on_bed
@@ -40,7 +40,7 @@ class Staircase:
         self._period = profile.drives.period if rate_hz is None else 1.0 / rate_hz
         self._limits = MotionLimits.from_profile(profile, direction_change_bound(profile))
         self._audit = Audit(profile)
-        self._timeline = Timeline(self._period)
+        self._timeline = Timeline(self._period, profile_shaper(self.profile))
         self._planner = Planner(self._limits, self._cables.reference_G)
         self._interpreter = Interpreter(profile, at_G=self._cables.reference_G)
 
@@ -62,7 +62,10 @@ class Staircase:
     def stand_at(self, at_G: Array) -> None:
         """The machine was stopped on its way and stands at (3,) m; modal state stays otherwise."""
         x, y, z = at_G.tolist()
-        self._planner, self._timeline = self._planner.moved_to(at_G), Timeline(self._period)
+        self._planner, self._timeline = (
+            self._planner.moved_to(at_G),
+            Timeline(self._period, profile_shaper(self.profile)),
+        )
         self._interpreter.modal = replace(self._interpreter.modal, position=(x, y, z), onward=None)
 
     def timed(self, chunks: Iterable[bytes]) -> Iterator[Command | Timed]:

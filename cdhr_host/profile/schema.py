@@ -43,6 +43,13 @@ class PathRules(Section):
     stop_angle: Annotated[
         float, key("stop_angle_deg", "corners sharper than this are exact stops", gt=0, le=180), IN_DEG
     ]
+    shaper: Annotated[
+        Literal["none", "zv", "mzv", "ei"], Field(description="input shaper against ringing; none leaves the motion as planned")
+    ] = "none"
+    shaper_frequency: Annotated[
+        float, key("shaper_frequency_hz", "frequency of the mode the shaper cancels", ge=0.5, le=500)
+    ] = 14.0
+    shaper_damping: Annotated[float, Field(description="damping ratio of that mode", ge=0, le=0.9)] = 0.02
 
 
 class Bed(Section):

@@ -178,3 +178,34 @@ def test_text_that_is_not_understood_is_refused_whole(paper):
     with pytest.raises(ProgramError) as caught:
         prove([b"G1 X10 F1200\nG6\nG1 Xa\n"], paper)
     assert {problem.line for problem in caught.value.problems} == {2, 3}
+
+
+@pytest.mark.parametrize("kind", ["zv", "mzv", "ei"])
+def test_shaping_keeps_every_promise_of_the_plain_motion(paper, kind):
+    rules = paper.path.model_copy(update={"shaper": kind, "shaper_frequency": 20.0})
+    shaped = paper.model_copy(update={"path": rules})
+    text = b"M83\nG1 Z5 F2400\nG1 X60 E100\nG1 Y60 E100\nG4 P50\nG1 X0 Y0 F6000\n"
+    proof = prove([text], shaped)
+    assert proof.ok
+    rows = joined(Staircase(shaped, rate_hz=1000.0).setpoints([text]))
+    corner = np.array([60, 0, 5]) * MM
+    assert np.linalg.norm(rows["nozzle_G"] - corner, axis=1).min() <= paper.path.tolerance
+    for order, limit in ((1, 0.1), (2, 0.5), (3, 5.0)):
+        change = np.linalg.norm(np.diff(rows["nozzle_G"], order, axis=0), axis=1).max() / 0.001**order
+        assert change <= limit * 1.001
+    laid = (rows["flow"] * 0.001).sum() / MM3
+    assert laid == pytest.approx(200, rel=0.01)
+    assert rows["nozzle_G"][-1] / MM == pytest.approx([0, 0, 5], abs=1e-9)
+    plain = prove([text], paper)
+    assert 0 < proof.duration - plain.duration < 1.0
+
+
+def test_a_mode_too_slow_to_shape_within_the_tolerance_is_refused(tmp_path):
+    from cdhr_host.errors import ProfileError
+    from cdhr_host.profile import find
+
+    text = find("paper").read_text().replace('shaper = "none"', 'shaper = "ei"')
+    path = tmp_path / "slow.toml"
+    path.write_text(text.replace("shaper_frequency_hz = 14.0", "shaper_frequency_hz = 1.0"))
+    with pytest.raises(ProfileError, match="1 Hz"):
+        open_profile(str(path))
