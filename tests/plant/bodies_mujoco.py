@@ -121,4 +121,3 @@ class Twin:
             tuple(q[7:10]),
             tuple(v[6:9]),
         )
-
