@@ -84,7 +84,7 @@ def _nodes(run: Run, limits: MotionLimits) -> Array:
 
 def _solved(run: Run, limits: MotionLimits, s: Array, slower: float) -> Reference:
     """The optimum near the plan slowed down by a factor."""
-    problem, guess = _Problem.of(run, limits, s), _guess(run, s, slower)
+    problem, guess = _Problem.of(run, limits, s), _guess(run, limits, s, slower)
     solver = casadi.nlpsol("reference", "ipopt", problem.nlp, _OPTIONS)
     answer = solver(x0=guess, lbx=problem.lower, ubx=problem.upper, lbg=problem.least, ubg=problem.most)
     n = len(s)
@@ -98,19 +98,27 @@ def _solved(run: Run, limits: MotionLimits, s: Array, slower: float) -> Referenc
 
 _OPTIONS = {
     "print_time": False,
-    "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 600, "tol": 1e-8, "constr_viol_tol": 1e-11, "mu_strategy": "adaptive"},
+    "ipopt": {
+        "print_level": 0,
+        "sb": "yes",
+        "max_iter": 600,
+        "tol": 1e-8,
+        "constr_viol_tol": 1e-11,
+        "mu_strategy": "adaptive",
+    },
 }
 
 
-def _guess(run: Run, s: Array, slower: float) -> Array:
-    """Unknowns of the plan, in the units of the optimisation's ``of`` for the paper's limits."""
+def _guess(run: Run, limits: MotionLimits, s: Array, slower: float) -> Array:
+    """The unknowns as the plan has them, in the optimisation's units."""
     t = np.arange(0.0, run.planned, SAMPLE_S / 4)
     where, rate, change = run.plan_at(t)
     when = np.interp(s, np.maximum.accumulate(where), t)
     rate, change = np.interp(when, t, rate) / slower, np.interp(when, t, change) / slower**2
     step = np.maximum(np.diff(when), 1e-5) * slower
-    jerk = np.clip(np.diff(change) / step, -5.0, 5.0)
-    return np.concatenate((rate / 0.1, change / 0.5, jerk / 5.0, step / UNIT_TIME))
+    jerk = np.clip(np.diff(change) / step / limits.jerk, -1.0, 1.0)
+    scaled = rate / limits.speed, change / limits.acceleration, jerk, step / UNIT_TIME
+    return np.concatenate(scaled)
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +137,7 @@ class _Problem:
         unknown = casadi.SX.sym("x", 4 * n - 2)
         rate, change = unknown[:n] * limits.speed, unknown[n : 2 * n] * limits.acceleration
         jerk, step = unknown[2 * n : 3 * n - 1] * limits.jerk, unknown[3 * n - 1 :] * UNIT_TIME
-        ties = _ties(limits, np.diff(s), rate, change, jerk, step)
+        ties = _ties(limits, np.diff(s), (rate, change, jerk), step)
         between = rate[:-1] + step * (change[:-1] / 2 + step * jerk / 8)
         kept = _kept(run, limits, s, (rate, between, change, jerk))
         nlp = {"x": unknown, "f": casadi.sum1(step), "g": casadi.vertcat(ties, kept)}
@@ -152,8 +160,9 @@ def _bounds(run: Run, s: Array) -> tuple[Array, Array]:
     return lower, upper
 
 
-def _ties(limits: MotionLimits, ds: Array, rate: Any, change: Any, jerk: Any, step: Any) -> Any:
+def _ties(limits: MotionLimits, ds: Array, motion: tuple[Any, Any, Any], step: Any) -> Any:
     """What constant s''' means for the nodes on either side of each step; 0 when kept."""
+    rate, change, jerk = motion
     v, a = rate[:-1], change[:-1]
     moved = step * (v + step * (a / 2 + step * jerk / 6)) - ds
     faster = v + step * (a + step * jerk / 2) - rate[1:]

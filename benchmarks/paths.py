@@ -117,7 +117,7 @@ def _joined(legs: list[Leg]) -> Run:
         start, piece = _between(leg.path, span)
         shift = borders[-1][-1] - span[0]
         borders.append(np.append(start[1:], span[1]) + shift)
-        curves.append(np.stack((*leg.path.at(start)[1:], leg.path.coefficients[3, piece])))
+        curves.append(np.stack((*leg.path.at(start)[1:], leg.path.coefficients[3][:, piece].T)))
         feeds.append(leg.segments.feed[leg.path.segment[piece]])
         bent.append(leg.path.bending[piece] > 0)
         when.append(leg.law.t + duration)
@@ -165,7 +165,7 @@ def _circle(radius_mm: float, chord_mm: float) -> Array:
     count = math.ceil(2 * math.pi * radius_mm / chord_mm)
     angle = 2 * math.pi * np.arange(count + 1) / count
     turn = radius_mm * np.column_stack((np.sin(angle), 1 - np.cos(angle)))
-    return np.vstack((turn + (5.0, 0.0), (15.0, 0.0)))
+    return np.vstack((turn + np.array([5.0, 0.0]), [15.0, 0.0]))
 
 
 def _spiral(turns: float, pitch_mm: float, chord_mm: float) -> Array:
@@ -226,6 +226,9 @@ EXCERPTS = {
     "prusa_vase_spiral_relE.gcode": (1000, 1040),
     "fullcontrol_nonplanar_generic_relE.gcode": (800, 830),
     "prusa_tile_infill_volE.gcode": (100, 116),
+    "paper_eq15.gcode": (500, 540),
+    "cura_ring.gcode": (1000, 1030),
+    "pot_spiral.gcode.gz": (9000, 9050),
 }
 """Rows of moves of real programs that are small enough for a dense optimisation."""
 
