@@ -85,8 +85,11 @@ class Loop(Protocol):
 
     truth: Truth
 
-    def tick(self, plan: Plan) -> tuple[Array, Action]:
-        """Run a tick from this plan on: (6,) m of sliders commanded or run, and what was done."""
+    def tick(self, plan: Plan, *, last: bool = False) -> tuple[Array, Action]:
+        """Run a tick from this plan on: (6,) m of sliders commanded or run, and what was done.
+
+        In the ``last`` one nothing is corrected any more, so that setpoints at rest stay so.
+        """
         ...
 
 
@@ -100,6 +103,7 @@ class OuterLoop:
         self._period = profile.drives.period
         self._sense = not setup.rigid
         self._rig_state, self._state = RigState(), self._controller.start()
+        self._action = Action(Mode.OPEN)
         self.truth = Truth(self._period)
         self._source = watched(self.truth)
 
@@ -108,15 +112,20 @@ class OuterLoop:
         """Of the controller."""
         return self._state
 
-    def tick(self, plan: Plan) -> tuple[Array, Action]:
+    def tick(self, plan: Plan, *, last: bool = False) -> tuple[Array, Action]:
         """See ``Loop``."""
+        if not last:
+            self._action = self._decided(plan)
+        commanded = shifted(self._cables, plan.position[None], self._action)[0]
+        self._rig_state = self._rig.step(self._rig_state, commanded.tolist())
+        self.truth.add(plan.t, self._rig_state.bodies.lower)
+        return commanded, self._action if not last else replace(self._action, notice="")
+
+    def _decided(self, plan: Plan) -> Action:
         tension = self._rig.sensed(self._rig_state).tension if self._sense and self._rig_state.tick else None
         seen = Seen(plan.position, plan.velocity, tension, self._source.latest(plan.t))
         self._state, action = self._controller.step(self._state, plan, seen, self._period)
-        commanded = shifted(self._cables, plan.position[None], action)[0]
-        self._rig_state = self._rig.step(self._rig_state, commanded.tolist())
-        self.truth.add(plan.t, self._rig_state.bodies.lower)
-        return commanded, action
+        return action
 
 
 class ForceLoop:
@@ -139,7 +148,7 @@ class ForceLoop:
         """Of the controller."""
         return self._state
 
-    def tick(self, plan: Plan) -> tuple[Array, Action]:
+    def tick(self, plan: Plan, *, last: bool = False) -> tuple[Array, Action]:  # noqa: ARG002
         """See ``Loop``."""
         dt = self._period / INNER_STEPS
         action = Action(Mode.CLOSED)
@@ -176,7 +185,7 @@ def closed_loop(
     for rows, plans in planned.batches():
         done = np.empty((len(rows), 6))
         for n, plan in enumerate(plans):
-            done[n], action = loop.tick(plan)
+            done[n], action = loop.tick(plan, last=planned.ended)
             if action.notice:
                 say(action.notice)
             if action.mode is Mode.STOP:
@@ -214,11 +223,12 @@ class _Ahead:
         self._setpoints = setpoints
         self._reference_G = cables.reference_G
         self._period = period
+        self.ended = False
         self._held: Setpoints | None = None
         self._before: Array | None = None
 
     def batches(self) -> Iterator[tuple[Setpoints, list[Plan]]]:
-        """Rows in order with their plans; the last row is a rest."""
+        """Rows in order with their plans; ``ended`` when it is the last row, a rest, by itself."""
         for batch in self._setpoints:
             if not len(batch):
                 continue
@@ -227,7 +237,7 @@ class _Ahead:
             if len(rows) > 1:
                 yield rows[:-1], self._plans(rows, len(rows) - 1)
         if self._held is not None:
-            rows, self._held = self._held, None
+            rows, self._held, self.ended = self._held, None, True
             yield rows, self._plans(rows, 1)
 
     def rest(self, rows: Setpoints, count: int) -> Setpoints:

@@ -40,6 +40,7 @@ class Twin:
 
     def xml(self, dt: float) -> str:
         shape, mass, build = self.profile.geometry, self.profile.platforms, self.build
+        spring = self.profile.spring
         wheel, top = shape.pulley_radius, shape.reference_height + shape.reference_separation
         pulleys, ends = "", ["", ""]
         for i in range(9):
@@ -57,7 +58,8 @@ class Twin:
         slides = "".join(f'<joint type="slide" axis="{axis}"/>' for axis in ("1 0 0", "0 1 0", "0 0 1"))
         tendons = "".join(
             f'<spatial name="cable{i}" stiffness="{k!r}" damping="{k * build.damping!r}" '
-            f'springlength="0 {9.0 if k else 0.0}"><site site="lead{i}"/><geom geom="wheel{i}" sidesite="side{i}"/>'
+            f'springlength="0 {9.0 if k else 0.0}"><site site="lead{i}"/>'
+            f'<geom geom="wheel{i}" sidesite="side{i}"/>'
             f'<site site="end{i}"/></spatial>'
             for i, k in enumerate(self.stiffness)
         )
@@ -70,14 +72,14 @@ class Twin:
             <inertial pos="0 0 0" mass="{mass.upper_mass}" diaginertia="1 1 1"/>
             <site name="high"/>{ends[1]}</body>
         </worldbody><tendon>{tendons}
-          <spatial stiffness="{self.profile.spring.stiffness}" springlength="{self.profile.spring.rest_length}">
+          <spatial stiffness="{spring.stiffness}" springlength="{spring.rest_length}">
             <site site="low"/><site site="high"/></spatial>
         </tendon><actuator>{motors}</actuator></mujoco>"""
 
     def place(self, state: BodiesState) -> None:
         height = self.profile.geometry.reference_height + self.build.mass_height
-        lower = np.array(state.lower) + [0.0, 0.0, height]
-        self.data.qpos[:] = [*lower, *state.turn, *state.upper]
+        x, y, z = state.lower
+        self.data.qpos[:] = [x, y, z + height, *state.turn, *state.upper]
         axes = np.zeros(9)
         mujoco.mju_quat2Mat(axes, np.array(state.turn))
         self.data.qvel[:] = [
