@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
-HELPERS = {"run", "measure", "programs", "paths", "yardstick"}
+HELPERS = {"run", "measure", "programs", "paths", "yardstick", "bound", "dense", "trapezoids"}
 
 
 def main() -> None:
