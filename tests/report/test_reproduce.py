@@ -1,0 +1,156 @@
+"""The paper by one command: acceptance rows 13, 14, 15, 18, and what the page says."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from cdhr_host.mechanism import Cables, jacobian, tensions, trajectories
+from cdhr_host.mechanism.cables import Loads
+from cdhr_host.mechanism.pairs import Pairs, shares
+from cdhr_host.mechanism.pulley import PULLEYS
+from cdhr_host.plant.bodies import Build
+from cdhr_host.report.paper import FIGURES, ITEMS, TABLES, Cell, Item, Study, experiment, item_name, reproduce
+from cdhr_host.report.paper.driven import Drive, driven
+from cdhr_host.report.paper.page import number, page, totals
+from cdhr_host.report.reproduce import PAGE, names_of, study, write
+
+QUICK = study(seeds=2, thorough=False)
+SIMULATION = QUICK.profiles["paper-simulation"]
+
+
+def disagreeing(item: Item) -> list[str]:
+    return [f"{cell.reading}: {cell.name} {cell.ours}" for cell in item.cells if cell.holds is False]
+
+
+def test_forces_held_a_millisecond() -> None:
+    """Row 13."""
+    run = driven(SIMULATION, Drive(PULLEYS["swivel"], held=1e-3))
+    assert_allclose(run.worst, [0.0044, 0.0046, 0.0008], rtol=0.1)
+
+
+def test_forces_without_compensation() -> None:
+    """Row 13."""
+    run = driven(SIMULATION, Drive(PULLEYS["point"]))
+    assert_allclose(run.worst, [1.554, 1.239, 13.12], rtol=0.01)
+
+
+def test_pairs_that_pull_alike() -> None:
+    """Row 14."""
+    run = driven(SIMULATION, Drive(PULLEYS["swivel"], build=Build(), alike=True))
+    assert_allclose(run.worst, [1.736, 1.561, 0.561], rtol=0.01)
+    assert_allclose(run.most_turned, [0.271, 0.268, 0.020], rtol=0.015)
+
+
+def test_shared_forces_do_not_turn_the_platform() -> None:
+    """Row 15."""
+    run = driven(SIMULATION, Drive(PULLEYS["swivel"], build=Build()))
+    assert run.most_turned.max() < 1e-6
+    q = trajectories.eq15(np.arange(0.0, 200.0, 0.5))
+    cables, pairs = Cables.from_profile(SIMULATION), Pairs.from_profile(SIMULATION)
+    force = tensions(cables, Loads.from_profile(SIMULATION), q, q)[:, :3]
+    shared, pulls = shares(cables, pairs, q, force), -jacobian(cables, q, q)[:, :3]
+    moment = (shared.left[:, :, None] * np.cross(pairs.left, pulls)).sum(axis=1)
+    moment += (shared.right[:, :, None] * np.cross(pairs.right, pulls)).sum(axis=1)
+    assert np.abs(moment).max() < 1e-12
+
+
+@pytest.fixture(scope="module")
+def second_table() -> experiment.Table:
+    profile = QUICK.profiles["paper"]
+    path = experiment.track(profile, experiment.LAWS["36"], 60.0)
+    machine = experiment.Faults.drawn(1, experiment.PAPER)
+    reached = experiment.open_loop(profile, path, machine, compensated=True, pulley="swivel")
+    looped = experiment.closed_loop(profile, path, machine, experiment.PAPER.camera)
+    found = [experiment.seen(path, one) for one in (reached, looped)]
+    return experiment.Table(found[0], found[0], [found[0]], [found[0]], [found[1]], [found[1]])
+
+
+def test_the_loop_is_better_than_compensation_alone(second_table: experiment.Table) -> None:
+    """Row 18."""
+    alone, looped = second_table.compensated_true[0], second_table.looped_true[0]
+    assert looped.distance() < 0.6 * alone.distance()
+    assert looped.greatest()[0] < alone.greatest()[0]
+    assert looped.greatest()[1] < alone.greatest()[1]
+
+
+def test_compensation_takes_three_quarters_of_the_error_away() -> None:
+    """Row 18, on the trajectory (15)."""
+    profile = QUICK.profiles["paper"]
+    path = experiment.track(profile, experiment.LAWS["15"])
+    bare = experiment.open_loop(profile, path, experiment.FAULTLESS, compensated=False, pulley="swivel")
+    machine = experiment.Faults.drawn(1, experiment.PAPER)
+    reached = experiment.open_loop(profile, path, machine, compensated=True, pulley="swivel")
+    left = experiment.seen(path, reached, experiment.PAPER.camera, 1).distance()
+    assert left < 0.25 * experiment.seen(path, bare).distance()
+
+
+@pytest.mark.parametrize("name", ["figure-5", "figure-6", "figure-8", "figure-10", "sensitivity"])
+def test_quick_items_find_what_the_study_found(name: str) -> None:
+    item = ITEMS[name](study(seeds=5, thorough=False))
+    known_exception = "lead of screws 0.1 %: plane"
+    assert [text for text in disagreeing(item) if not text.startswith(known_exception)] == []
+    assert len(item.why) > 20
+
+
+def test_figures_and_tables_are_all_there() -> None:
+    names = {item_name("figure", n) for n in FIGURES} | {item_name("table", n) for n in TABLES}
+    assert names | {"sensitivity"} == set(ITEMS)
+    assert names_of(15, 1) == ["table-1"]
+    assert names_of(None, None) == list(ITEMS)
+    with pytest.raises(KeyError, match="figure-9"):
+        names_of(9, None)
+
+
+def test_page_has_every_number_and_picture(tmp_path: Path) -> None:
+    told: list[str] = []
+    found = write(["figure-6", "figure-8"], QUICK, tmp_path, lambda name, item: told.append(name), workers=1)
+    text = (tmp_path / PAGE).read_text(encoding="utf-8")
+    assert told == ["figure-6", "figure-8"]
+    assert text.count("| yes |") == sum(len(item.cells) for item in found.values())
+    assert "![" in text
+    assert (tmp_path / "figure-6.png").stat().st_size > 5000
+    assert totals(found.values()) == (6, 6)
+
+
+def test_several_processes_find_the_same() -> None:
+    names = ["figure-6", "figure-8"]
+    one, two = (dict(reproduce(names, QUICK, workers=workers)) for workers in (1, 2))
+    assert [cell.ours for name in names for cell in one[name].cells] == [
+        cell.ours for name in names for cell in two[name].cells
+    ]
+
+
+def test_a_number_beside_the_paper_s() -> None:
+    cell = Cell("x", "0.5", 0.6, "mm", "as read", 0.58, 0.01)
+    assert cell.ratio == pytest.approx(1.2)
+    assert cell.holds is False
+    assert Cell("x", "", 0.6, "mm", "as read").ratio is None
+    assert Cell("x", "0", 0.6, "mm", "as read").ratio is None
+    text = page({"a": Item("A", (cell,), "Because.")}, {}, 5)
+    assert "| x, mm | 0.5 | 0.6 | 1.2 | 0.58 | **no** | as read |" in text
+    assert number(1e-13) == "0"
+
+
+def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from cdhr_host.cli.app import app
+
+    app(["reproduce", "--figure", "6", "--out", str(tmp_path), "--json"], standalone_mode=False)
+    record = json.loads(capsys.readouterr().out)
+    assert (record["compared"], record["agree"]) == (4, 4)
+    assert Path(record["page"]).exists()
+
+
+def test_the_command_refuses_a_figure_the_paper_has_not(capsys: pytest.CaptureFixture[str]) -> None:
+    from cdhr_host.cli.app import app
+
+    with pytest.raises(SystemExit) as ended:
+        app(["reproduce", "--figure", "99"])
+    assert ended.value.code == 2
+    assert "no figure-99" in capsys.readouterr().err
+
+
+def test_study_is_of_both_columns() -> None:
+    assert set(Study(QUICK.profiles).profiles) == {"paper", "paper-simulation"}
