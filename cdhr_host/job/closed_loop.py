@@ -31,7 +31,8 @@ from cdhr_host.mechanism import Cables, lengths, slider
 from cdhr_host.mechanism.pairs import Pairs, shares
 from cdhr_host.motion.hold import path_true_stop, rows_needed
 from cdhr_host.plant.bodies import Bodies, BodiesState, Forces
-from cdhr_host.plant.faults import FAULTLESS, Faults
+from cdhr_host.plant.capture import Camera, SimulatedCapture
+from cdhr_host.plant.faults import FAULTLESS, PAPER, Faults
 from cdhr_host.plant.held import Held
 from cdhr_host.plant.rig import Rig, RigState
 from cdhr_host.plant.strands import Strands
@@ -148,11 +149,11 @@ class ForceLoop:
         """Of the controller."""
         return self._state
 
-    def tick(self, plan: Plan, *, last: bool = False) -> tuple[Array, Action]:  # noqa: ARG002
-        """See ``Loop``."""
+    def tick(self, plan: Plan, *, last: bool = False) -> tuple[Array, Action]:
+        """See ``Loop``; in the last tick the drives hold the sliders where they are."""
         dt = self._period / INNER_STEPS
         action = Action(Mode.CLOSED)
-        for n in range(INNER_STEPS):
+        for n in range(0 if last else INNER_STEPS):
             action = self._inner(_ahead(plan, n * dt), dt)
         self.truth.add(plan.t, self._body.lower)
         return np.array(self._run), action
@@ -171,6 +172,24 @@ class ForceLoop:
         self._body = self._bodies.step(self._body, Forces(force), dt)
         self._run = self._bodies.run(self._body)
         return action
+
+
+def simulated(control: str, profile: Profile, *, seed: int = 1, watched: Watched | None = None) -> Loop:
+    """``outer`` or ``ppc`` on the machine of this seed, drawn from the paper's budget of faults.
+
+    Without ``watched`` a simulated camera with that budget's noise is the pose source. Raises
+    JobError for any other word.
+    """
+    setup = Setup(Faults.drawn(seed, PAPER))
+    camera = Camera(noise=PAPER.camera, seed=seed)
+    source = watched or (lambda truth: SimulatedCapture(camera, truth))
+    if control == "outer":
+        return OuterLoop(profile, setup, source)
+    if control == "ppc":
+        return ForceLoop(profile, setup, source)
+    raise JobError(
+        Problem("control", f"no control '{control}'", hint="there are outer and ppc, and none without a loop")
+    )
 
 
 def closed_loop(

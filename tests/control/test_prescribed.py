@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
@@ -105,7 +106,7 @@ def test_without_the_auxiliary_system_its_state_stays_empty() -> None:
 
 def test_optimised_forces_trade_the_plane_for_the_height() -> None:
     clip, weighted = (
-        followed(SIMULATION, Loop(Gains(reach=0.43, layer=0.0, weight=weight), 2e-3)).worst
+        followed(SIMULATION, Loop(Gains(reach=0.43, layer=0.0, weight=weight), 2e-3), 6.0).worst
         for weight in (None, 30.0)
     )
     assert weighted[2] < 0.5 * clip[2]
@@ -138,3 +139,12 @@ def test_state_is_not_changed_in_place() -> None:
     controller.step(state, plan, seen, 1e-3)
     assert (state.lag == before.lag).all()
     assert (state.total == before.total).all()
+
+
+@pytest.mark.parametrize(("delay", "greatest", "least"), [(5, 6e-2, 4e-2), (15, 0.2, 0.1), (30, 1e3, 2.0)])
+def test_delay_costs_speed_times_delay_until_it_costs_stability(
+    delay: int, greatest: float, least: float
+) -> None:
+    """10, 30 and 60 ms at 500 Hz on the circle of 6.28 mm/s."""
+    worst = followed(SIMULATION, Loop(Gains(), 2e-3, delay=delay), seconds=6.0).worst.max()
+    assert least < worst < greatest

@@ -4,11 +4,14 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from trajectories import ManualClock
 
 from cdhr_host.control import Mode, OuterSettings
 from cdhr_host.control.funnel import Funnel
+from cdhr_host.drives import open_link
 from cdhr_host.errors import JobError
-from cdhr_host.job.closed_loop import ForceLoop, OuterLoop, Setup, Truth, closed_loop
+from cdhr_host.job import stream
+from cdhr_host.job.closed_loop import ForceLoop, OuterLoop, Setup, Truth, closed_loop, simulated
 from cdhr_host.mechanism import Cables
 from cdhr_host.motion.hold import ends_at_rest
 from cdhr_host.pipeline import Staircase, open_profile
@@ -89,3 +92,27 @@ def test_truth_is_linear_between_ticks() -> None:
     assert truth(1.0)[0] == pytest.approx(1.0)
     assert truth(1.005)[0] == pytest.approx(2.0)
     assert truth(9.0)[0] == 3.0
+
+
+def test_loops_by_their_names() -> None:
+    assert isinstance(simulated("outer", PROFILE), OuterLoop)
+    assert isinstance(simulated("ppc", PROFILE), ForceLoop)
+    with pytest.raises(JobError, match="no control 'pid'"):
+        simulated("pid", PROFILE)
+
+
+@pytest.mark.parametrize("control", ["outer", "ppc"])
+def test_a_controlled_print_runs_on_the_simulated_drives(control: str) -> None:
+    clock = ManualClock()
+    link = open_link("loopback:", PROFILE, clock)
+    loop, sent = simulated(control, PROFILE), []
+    summary = stream(
+        closed_loop(planned(), loop, PROFILE, str),
+        link,
+        clock,
+        start=np.zeros(6),
+        on_rows=lambda rows, feedback: sent.append(rows),
+    )
+    assert summary.ticks == sum(len(batch) for batch in planned())
+    assert not summary.interrupted
+    assert np.linalg.norm(errors(loop, sent), axis=1).max() < 1e-3

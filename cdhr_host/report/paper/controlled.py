@@ -29,6 +29,8 @@ class Loop:
     """s between two control steps"""
     noise: float = 0.0
     """m of the measured positions"""
+    delay: int = 0
+    """control steps a measurement is old"""
     inner: float = 1e-3
     """s the plant is stepped by at most"""
 
@@ -59,10 +61,11 @@ def followed(profile: Profile, loop: Loop, seconds: float = 10.0) -> Followed:
     controller = Prescribed(profile, loop.gains)
     state, memory = _started(q[0], v[0]), controller.start()
     steps = max(1, round(loop.period / loop.inner))
+    heard: list[Seen] = []
     error, tension, saturated = np.empty((len(t) - 1, 3)), np.empty((len(t) - 1, 6)), 0
     for n in range(len(t) - 1):
-        seen = _seen(state, loop.noise * normal(1, 0, n, 6))
-        memory, action = controller.step(memory, Plan(float(t[n]), q[n], v[n], a[n]), seen, loop.period)
+        heard = [*heard, _seen(state, loop.noise * normal(1, 0, n, 6))][-1 - loop.delay :]
+        memory, action = controller.step(memory, Plan(float(t[n]), q[n], v[n], a[n]), heard[0], loop.period)
         assert action.tension is not None
         tension[n] = action.tension
         saturated += controller.at_bound(action.tension)
