@@ -58,6 +58,7 @@ def sim(
 def _far(bus: str, machine: "Profile") -> "Serial":
     import time
 
+    from cdhr_host.drives.sim.bridge import Bridge
     from cdhr_host.drives.sim.serve import SlcanStation
 
-    return SlcanStation(machine, time.monotonic())
+    return (SlcanStation if bus == "slcan" else Bridge)(machine, time.monotonic())

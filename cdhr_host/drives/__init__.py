@@ -47,15 +47,18 @@ def make_link(url: str, profile: Profile, clock: Clock) -> MachineLink:
         if rest:
             raise _refusal(f"drives '{url}': loopback: takes nothing after the colon", "use loopback:")
         return Loopback(profile, clock)
-    return _wired(url, scheme, profile, clock)
+    return _wired(url, scheme, profile)
 
 
-def _wired(url: str, scheme: str, profile: Profile, clock: Clock) -> MachineLink:
+def _wired(url: str, scheme: str, profile: Profile) -> MachineLink:
     """A link to drives outside this process; their libraries are imported only here."""
     from cdhr_host.drives.address import split_rate  # noqa: PLC0415
+    from cdhr_host.drives.bridge.pumped import PumpedBridge  # noqa: PLC0415
     from cdhr_host.drives.reference import default_store  # noqa: PLC0415
     from cdhr_host.drives.sender import SenderLink  # noqa: PLC0415
 
+    if scheme == "link":
+        return PumpedBridge(profile, *split_rate(url, "BAUD", 921_600))
     if scheme == "slcan":
         split_rate(url, "BITRATE", 1_000_000)
     return SenderLink(url, profile, default_store())

@@ -64,14 +64,14 @@ class RowBuffer:
         """Rows that may be executed without a stop."""
         return len(self._queue) - (0 if self.at_rest else self.reserve)
 
-    def feed(self, rows: Setpoints) -> int:
-        """Check all rows, take the first there is room for; how many. Raises DriveError."""
+    def feed(self, rows: Setpoints, room: int | None = None) -> int:
+        """Check all rows, take the first there is ``room`` for; how many. Raises DriveError."""
         if not len(rows):
             return 0
         fresh = self._next_tick is None
         reach = STANDS_WITHIN if fresh else None
         check_rows(rows, self._profile, tick=self._next_tick, before=self._tail[1], reach=reach)
-        accepted = rows[: self.free]
+        accepted = rows[: self.free if room is None else max(room, 0)]
         if len(accepted):
             self._queue.append(accepted)
             self._next_tick = int(accepted.tick[-1]) + 1

@@ -280,6 +280,7 @@ class CyclicLink:
         if self._fault is not None:
             return
         self._fault, self._told = found, False
+        self._forget_lost()
         if self.state is LinkState.RUNNING:
             self._begin_stop()
         elif self.state is not LinkState.STOPPING:
@@ -338,6 +339,12 @@ class CyclicLink:
             self._scaling = Scaling(self.profile, self._store.zero(self.profile, self.machine.found.serials))
         elif mode == "homing" and not self._homed:
             raise unreferenced([1, 2, 3, 4, 5, 6])
+
+    def _forget_lost(self) -> None:
+        """A stored reference of an axis that cannot be trusted any more is stored no longer."""
+        lost = self.machine.watch.unreferenced
+        if lost and self.profile.canopen.reference == "stored":
+            self._store.forget(self.profile, [self.machine.found.serials[axis] for axis in lost])
 
     def _check_ready(self, axis: Axis) -> None:
         if axis.state.value.startswith("fault"):

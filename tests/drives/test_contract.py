@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bench import Bench, PtyWire
+from bench import Bench, BridgeBench, PtyWire
 from durand_far import DurandStation
 from trajectories import PAPER, PERIOD, changed, cut, loopback, run_of
 
@@ -13,6 +13,7 @@ from cdhr_host.errors import DriveError
 LINKS = {
     "loopback": loopback,
     "slcan": lambda: over(Bench(wire=PtyWire)),
+    "link": lambda: over(BridgeBench()),
     "durand": lambda: over(Bench(far=DurandStation, link_loss_tested=True)),
 }
 ZERO = np.zeros(6)

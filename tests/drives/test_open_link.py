@@ -13,9 +13,7 @@ def test_loopback_is_opened():
     assert _open("loopback:").state is LinkState.OPEN
 
 
-@pytest.mark.parametrize(
-    "url", ["slcan:", "slcan:@1000000", "slcan:/dev/null@fast", "link:", "link:/dev/x@"]
-)
+@pytest.mark.parametrize("url", ["slcan:", "slcan:@1000000", "slcan:/dev/null@fast", "link:", "link:/dev/x@"])
 def test_paths_and_rates_are_checked_before_anything_is_started(url):
     with pytest.raises(DriveError, match=r"are not (slcan|link):PATH"):
         _open(url)

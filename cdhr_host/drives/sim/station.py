@@ -90,9 +90,12 @@ class Station:
         """The emergency stop: torque off by hardware, air dumped."""
         self.estop = pressed
         self.coupler.values[0x6000, 1] = 2 if pressed else 3
-        if pressed:
-            for drive in self.drives:
+        for drive in self.drives:
+            if pressed:
                 drive.drop(State.SWITCH_ON_DISABLED)
+                drive.stubborn.add(State.SWITCH_ON_DISABLED)
+            else:
+                drive.stubborn.discard(State.SWITCH_ON_DISABLED)
 
     def exchange(self, now: float, frames: Iterable[Frame]) -> list[Frame]:
         """Frames from the host -> frames to it, by the time ``now``."""
