@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from cdhr_host import __version__
-from cdhr_host.cli import compensation, dry_run, generate, jog, profiles, reproduce, sim, stream
+from cdhr_host.cli import compensation, drives, dry_run, generate, jog, profiles, reproduce, sim, stream
 from cdhr_host.cli.options import examples
 from cdhr_host.cli.refusals import RefusingGroup
 
@@ -31,6 +31,7 @@ app.command("dry-run", epilog=dry_run.EXAMPLES)(dry_run.dry_run)
 app.command("jog", epilog=jog.EXAMPLES)(jog.jog)
 app.command("sim", epilog=sim.EXAMPLES)(sim.sim)
 app.add_typer(profiles.app, name="profile")
+app.add_typer(drives.app, name="drives")
 app.command("compensation", epilog=compensation.EXAMPLES)(compensation.compensation)
 app.command("reproduce", epilog=reproduce.EXAMPLES)(reproduce.reproduce)
 app.add_typer(generate.app, name="generate")

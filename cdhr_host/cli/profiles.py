@@ -65,6 +65,7 @@ def check(
     ] = None,
 ) -> None:
     """Read profiles and list everything wrong with them; exit code 3 when there is anything."""
+    from cdhr_host.drives.canopen.load import bus_share
     from cdhr_host.errors import ProfileError
     from cdhr_host.pipeline import open_profile
     from cdhr_host.profile import profile_names
@@ -74,7 +75,8 @@ def check(
         try:
             with about(name):
                 profile = open_profile(name)
-            emit(f"{name}: ok: {profile.machine.name}")
+                load = bus_share(profile)
+            emit(f"{name}: ok: {profile.machine.name}; CAN bus {load:.0%} full at worst")
         except Refusal as refusal:
             refusals.append(str(refusal))
     if refusals:

@@ -9,7 +9,7 @@ from cdhr_host import __version__
 from cdhr_host.job import RunSummary
 from cdhr_host.pipeline import Proof
 from cdhr_host.report.summary import CM3, duration_text
-from cdhr_host.units import KPA, MM, MM3
+from cdhr_host.units import KPA, MM, MM3, MS
 
 
 def run_record(run: RunSummary, proof: Proof, file: str, profile: str) -> dict[str, Any]:
@@ -32,6 +32,7 @@ def run_record(run: RunSummary, proof: Proof, file: str, profile: str) -> dict[s
         "following_rms_mm": (run.following_rms / MM).tolist(),
         "torque_max_nm": run.torque_max.tolist(),
         "pressure_deviation_max_kpa": run.pressure_deviation_max / KPA,
+        "timing": _timing(run),
     }
 
 
@@ -47,6 +48,25 @@ def run_lines(run: RunSummary, proof: Proof, file: str) -> Iterator[str]:
     away, torque = run.following_max / MM, run.torque_max
     yield f"  following  {away.max():.3f} mm at most (slider {away.argmax() + 1})"
     yield f"  torque     {torque.max():.3f} N m at most (motor {torque.argmax() + 1})"
+    if (timing := run.timing) is not None:
+        late = f"p50 {timing.p50 / MS:.3f}, p99 {timing.p99 / MS:.3f}, p99.9 {timing.p999 / MS:.3f} ms"
+        yield f"  lateness   {late}, {timing.max / MS:.3f} ms at most; {timing.skipped} cycles skipped"
+
+
+def _timing(run: RunSummary) -> dict[str, Any] | None:
+    if run.timing is None:
+        return None
+    timing = run.timing
+    return {
+        "cycles": timing.cycles,
+        "p50_ms": timing.p50 / MS,
+        "p99_ms": timing.p99 / MS,
+        "p999_ms": timing.p999 / MS,
+        "max_ms": timing.max / MS,
+        "skipped": timing.skipped,
+        "late": timing.late,
+        "real_time": timing.real_time,
+    }
 
 
 def joined(runs: Sequence[RunSummary]) -> RunSummary:

@@ -5,7 +5,8 @@ from functools import partial
 import numpy as np
 import pytest
 from bench import Bench
-from fault_cases import CASES, run
+from fault_cases import CASES
+from fault_runs import run
 from trajectories import PAPER, run_of
 
 from cdhr_host.drives import LinkState

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from cdhr_host.drives.canopen.pdo import all_maps
-from cdhr_host.errors import Problem
+from cdhr_host.errors import Problem, ProfileError
 from cdhr_host.profile.schema import Profile
 
 BIT_RATE: Final = 1_000_000
@@ -39,20 +39,22 @@ def bus_load(profile: Profile, bit_rate: int = BIT_RATE) -> BusLoad:
     return BusLoad(bits, bits / (profile.drives.period * bit_rate) + background)
 
 
-def overload(profile: Profile) -> Problem | None:
-    """The reason to refuse a profile whose bus would be too full; None when it is not."""
+def bus_share(profile: Profile) -> float:
+    """The share of the bus a profile fills in the worst case; ProfileError above REFUSED_ABOVE."""
     load = bus_load(profile)
-    if load.share <= REFUSED_ABOVE:
-        return None
-    return Problem(
-        "bus-load",
-        f"the CAN bus would be {load.share:.0%} full in the worst case (limit {REFUSED_ABOVE:.0%})",
-        key="canopen.feedback_every",
-        value=round(100 * load.share, 1),
-        limit=100 * REFUSED_ABOVE,
-        unit="percent",
-        hint="a longer [drives] period_ms, or feedback_every = 4, or the framed link",
-    )
+    if load.share > REFUSED_ABOVE:
+        raise ProfileError(
+            Problem(
+                "bus-load",
+                f"the CAN bus would be {load.share:.0%} full in the worst case (limit {REFUSED_ABOVE:.0%})",
+                key="canopen.feedback_every",
+                value=round(100 * load.share, 1),
+                limit=100 * REFUSED_ABOVE,
+                unit="percent",
+                hint="a longer [drives] period_ms, or feedback_every = 4, or the framed link",
+            )
+        )
+    return load.share
 
 
 def _cyclic(profile: Profile) -> Iterator[float]:
