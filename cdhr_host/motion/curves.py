@@ -26,6 +26,8 @@ SPARE = 0.5
 """Of the sagitta: what the spacing between two places may add to it."""
 SLOW = 0.1
 """Of the mean |B'|: where it is least and below this, the curve nearly stands still."""
+SHORTEST = 1e-12
+"""m, less is rounding."""
 STANDING = 1e-6
 """Of the greatest |B'|: below this the curvature is rounding."""
 
@@ -33,12 +35,12 @@ STANDING = 1e-6
 def points_on(spline: Spline, half_width: float) -> Array:
     """(M + 1, 3) m: points on a curve, from its start to its end, chords within CHORD_ERROR of it.
 
-    A curve that has no length gives its two ends.
+    A curve shorter than SHORTEST is its two ends.
     """
     control = spline.control_G
     t, breaks = _places(control)
     s = _lengths_to(control, t)
-    if s[-1] == 0.0:
+    if s[-1] < SHORTEST:
         return control[[0, 3]]
     density = _density(control, t, s, half_width)
     reached = np.concatenate(([0.0], np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(s))))

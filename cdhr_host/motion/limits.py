@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdhr_host.errors import MotionError, Problem
+from cdhr_host.mechanism import UpperBounds
 from cdhr_host.motion.shaping import Shaper, shaper
 from cdhr_host.motion.smooth_path import SmoothPath
 from cdhr_host.profile import Profile
@@ -36,6 +37,10 @@ MERGE = 0.1
 """m, cells are merged up to this length, so that a long path has borders to stop at."""
 CHORD_ERROR = 1e-6
 """m, how far the chords that stand for a curve may be from it."""
+
+
+FOLLOWING = UpperBounds(1.0, 0.0, 0.0)
+"""An upper platform at a constant offset."""
 
 
 def _too_slow_sliders(speed: float) -> Problem:
@@ -84,18 +89,24 @@ class MotionLimits:
     """m, the part of every tolerance that input shaping needs"""
 
     @classmethod
-    def from_profile(cls, profile: Profile, bend: float) -> "MotionLimits":
+    def from_profile(cls, profile: Profile, bend: float, upper: UpperBounds = FOLLOWING) -> "MotionLimits":
         """Nozzle limits under which the sliders' limits hold too.
 
         ``bend`` (1/m) bounds, over the bed, how much a cable's direction turns for each metre
-        of nozzle travel, g = 1/L + cos(theta)/rho. With l' = -e·v and |e| = 1:
+        its platform moves, g = 1/L + cos(theta)/rho; ``upper`` bounds the upper platform's motion
+        by the nozzle's. With l' = -e·v and |e| = 1, for the motion of the cable's platform,
         |l'| <= v, |l''| <= a + g v², |l'''| <= j + 3 g a v + 6 g² v³.
         Raises MotionError where that leaves nothing for the nozzle.
         """
         limits, sliders = profile.limits, profile.sliders
-        v = min(limits.speed_max, sliders.speed_max)
-        a = min(limits.acceleration_max, sliders.acceleration_max - bend * v**2)
-        j = min(limits.jerk_max, sliders.jerk_max - 3 * bend * v * a - 6 * bend**2 * v**3)
+        v = min(limits.speed_max, sliders.speed_max / upper.slope)
+        turning = upper.bend * v**2
+        a = (sliders.acceleration_max - turning - bend * (upper.slope * v) ** 2) / upper.slope
+        a = min(limits.acceleration_max, a)
+        fast, hard = upper.slope * v, upper.slope * a + turning
+        turned = 3 * bend * hard * fast + 6 * bend**2 * fast**3
+        j = (sliders.jerk_max - 3 * upper.bend * v * a - upper.twist * v**3 - turned) / upper.slope
+        j = min(limits.jerk_max, j)
         if a <= 0.0 or j <= 0.0:
             raise MotionError(_too_slow_sliders(v))
         shaped = profile_shaper(profile).deviation(a)

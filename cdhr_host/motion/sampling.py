@@ -115,6 +115,14 @@ class Timeline:
         self._time = last * self.period
         return self._timed(laid, last + 1)
 
+    def reserve(self, count: int) -> range:
+        """Ticks for what moves while the nozzle stands; only after ``rest``, or at the very start."""
+        ticks = range(self._tick, self._tick + count)
+        self._tick = ticks.stop
+        self._time = (ticks.stop - 1) * self.period
+        self._laid = ()
+        return ticks
+
     def _add(self, stretch: Stretch) -> tuple[Laid, ...]:
         """The stretch behind those that the shaper still sees from its begin on."""
         seen = self._time - self._shaper.length

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdhr_host.values import Array, Ints
+from cdhr_host.values import Array, Flags, Ints
 
 STRAIGHT = 1e-9
 """Direction changes below this (rad) are no corners."""
@@ -76,28 +76,45 @@ def smooth(points: Array, h: float, *, opens: bool, closes: bool) -> SmoothPath:
     steps = np.diff(points, axis=0)
     lengths = _norm(steps)
     drawn = np.concatenate(([0.0], np.cumsum(lengths)))
-    corner_s, turn = _corners(drawn, steps / lengths[:, None], opens=opens, closes=closes)
+    direction = steps / lengths[:, None]
+    corner_s, turn = _corners(drawn, direction, opens=opens, closes=closes)
     last = drawn[-1] + h if closes else drawn[-1]
     knots, third, bending = _knots(corner_s, turn, h, last, drawn)
     widths = np.diff(knots, append=last)[:, None]
+    segment = np.clip(np.searchsorted(drawn, knots, side="right") - 1, 0, len(lengths) - 1)
+    straight = bending == 0
     second = _before(third * widths)
-    second[bending == 0] = 0.0
-    initial = np.zeros(3) if opens else steps[0] / lengths[0]
+    second[straight] = 0.0
+    initial = np.zeros(3) if opens else direction[0]
     slope = initial + _before(second * widths + third * widths**2 / 2)
+    slope = _anchored(slope, direction[segment], straight)
     increments = slope * widths + second * widths**2 / 2 + third * widths**3 / 6
     value = points[0] - h * initial + _before(increments)
-    segment = np.clip(np.searchsorted(drawn, knots, side="right") - 1, 0, len(lengths) - 1)
+    value = _anchored(
+        value, points[segment] + (knots - drawn[segment])[:, None] * direction[segment], straight
+    )
     coefficients = np.stack([np.ascontiguousarray(rows.T) for rows in (value, slope, second, third)])
     return SmoothPath(knots, float(last), coefficients, segment, bending)
+
+
+def _anchored(sums: Array, drawn: Array, straight: Flags) -> Array:
+    """Running sums (K, 3) shifted to what is drawn wherever the path is straight, and on from there.
+
+    So neither rounding nor turns too small to be corners add up along the path.
+    """
+    latest = np.maximum.accumulate(np.where(straight, np.arange(len(sums)), -1))
+    shift = np.where((latest >= 0)[:, None], (drawn - sums)[latest], 0.0)
+    return np.asarray(sums + shift, dtype=np.float64)
 
 
 def _corners(drawn: Array, direction: Array, *, opens: bool, closes: bool) -> tuple[Array, Array]:
     """Where the direction changes, and by which vector."""
     rest = np.zeros((1, 3))
     around = np.concatenate((rest if opens else direction[:1], direction, rest if closes else direction[-1:]))
-    turn = np.diff(around, axis=0)
-    bends = _norm(turn) > STRAIGHT
-    return drawn[bends], turn[bends]
+    bends = np.flatnonzero(_norm(np.diff(around, axis=0)) > STRAIGHT)
+    # Each corner takes along the turns before it that were too small to be one.
+    before = around[np.concatenate(([0], bends[:-1] + 1))] if len(bends) else around[:0]
+    return drawn[bends], around[bends + 1] - before
 
 
 def _knots(corner: Array, turn: Array, h: float, last: float, drawn: Array) -> tuple[Array, Array, Ints]:

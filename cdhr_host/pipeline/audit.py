@@ -1,7 +1,7 @@
 """Every sample against every limit of the profile."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,13 +22,15 @@ class _Rule:
 
     kind: str
     what: str
-    """sentence with ``{value}``, ``{limit}`` and ``{i}``, the cable or slider from 1"""
+    """sentence with ``{value}``, ``{limit}`` and ``{i}``, the cable's or slider's name"""
     hint: str
     unit: str
     si: float
     """factor from the unit to SI"""
     upper: bool
     """whether the limit is a greatest value"""
+    names: tuple[str, ...] = ("1", "2", "3", "4", "5", "6")
+    """of cables or sliders"""
 
 
 RADIUS = _Rule(
@@ -62,6 +64,9 @@ SLACK = _Rule(
 OVERLOAD = _Rule(
     "force", "cable {i} would carry {value} N, more than {limit} N", _FORCE_HINT, "N", 1.0, upper=True
 )
+PAIRED = ("1 left", "2 left", "3 left", "1 right", "2 right", "3 right")
+SINGLE_SLACK = replace(SLACK, names=PAIRED)
+SINGLE_OVERLOAD = replace(OVERLOAD, names=PAIRED)
 WOUND_IN = _Rule(
     "travel",
     "slider {i} would be at {value} mm, its travel ends at {limit} mm",
@@ -148,14 +153,17 @@ class Audit:
         ]
         return sorted(found, key=_by_line)
 
-    def motion(self, track: ToolTrack, state: CableState, setpoints: Setpoints) -> list[Problem]:
-        """What of a block breaks a limit of cables, sliders, nozzle or air."""
+    def motion(self, track: ToolTrack, state: CableState, nine: Array, setpoints: Setpoints) -> list[Problem]:
+        """What of a block breaks a limit of cables, sliders, nozzle or air; ``nine`` (N, 9) N."""
+        forces = self._profile.forces
         line, limits, sliders = track.line, self._profile.limits, self._profile.sliders
         speed, acceleration = _norm(track.velocity)[:, None], _norm(track.acceleration)[:, None]
         pressure, supply = setpoints.pressure[:, None], self._profile.extruder.pressure_max
         found = [
             *self._broken(SLACK, line, state.tension, self._least),
             *self._broken(OVERLOAD, line, state.tension, self._greatest),
+            *self._broken(SINGLE_SLACK, line, nine[:, :6], forces.single_min),
+            *self._broken(SINGLE_OVERLOAD, line, nine[:, :6], forces.single_max),
             *self._broken(WOUND_IN, line, setpoints.slider, sliders.travel_min),
             *self._broken(PAID_OUT, line, setpoints.slider, sliders.travel_max),
             *self._broken(SLIDER_SPEED, line, np.abs(state.rate), sliders.speed_max),
@@ -191,8 +199,8 @@ def _problem(rule: _Rule, line: int, i: int, value: float, limit: float) -> Prob
     digits = 3
     while f"{value:.{digits}f}" == f"{limit:.{digits}f}" and digits < 9:
         digits += 1
-    message = rule.what.format(i=i + 1, value=f"{value:.{digits}f}", limit=f"{limit:g}")
-    key = f"{rule.kind} {i + 1} {'most' if rule.upper else 'least'}"
+    message = rule.what.format(i=rule.names[i], value=f"{value:.{digits}f}", limit=f"{limit:g}")
+    key = f"{rule.kind} {rule.names[i]} {'most' if rule.upper else 'least'}"
     return Problem(
         rule.kind, message, line=line, key=key, value=value, limit=limit, unit=rule.unit, hint=rule.hint
     )

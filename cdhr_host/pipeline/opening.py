@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 from cdhr_host.errors import MotionError, Problem, ProfileError
-from cdhr_host.mechanism import direction_change_bound, inconsistencies
-from cdhr_host.motion.limits import MotionLimits
+from cdhr_host.mechanism import inconsistencies
+from cdhr_host.pipeline.rig import Rig
 from cdhr_host.profile import Profile, described, find, read_table, validate
 
 
@@ -38,8 +38,8 @@ def _contradictions(profile: Profile) -> Iterator[tuple[frozenset[str], Problem]
     if found:
         return
     try:
-        MotionLimits.from_profile(profile, direction_change_bound(profile))
+        Rig.from_profile(profile).limits()
     except MotionError as error:
-        sections = ("limits", "sliders", "path")
+        sections = ("limits", "sliders", "path", "spring")
         keys = frozenset(f"{section}.{key}" for section, key, *_ in described(profile) if section in sections)
         yield keys, error.problems[0]

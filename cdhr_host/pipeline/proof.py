@@ -1,6 +1,6 @@
 """The whole file walked once without drives: time, extremes, and everything it cannot do."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import singledispatchmethod
 
@@ -10,7 +10,9 @@ from cdhr_host.errors import MAX_LISTED, Problem
 from cdhr_host.motion.arc import arc_length
 from cdhr_host.motion.curves import spline_length
 from cdhr_host.motion.sampling import Timed
+from cdhr_host.pipeline.clearing import Clearing
 from cdhr_host.pipeline.columns import setpoint_columns
+from cdhr_host.pipeline.shift import Shift
 from cdhr_host.pipeline.staircase import Checked, Staircase
 from cdhr_host.pipeline.survey import Survey
 from cdhr_host.pipeline.trace import Trace, Tracer
@@ -27,6 +29,7 @@ from cdhr_host.values import (
     Setpoints,
     Spline,
     Stop,
+    ToolTrack,
 )
 
 Extreme = tuple[float, int, float, int]
@@ -79,22 +82,32 @@ def prove(
     machine cannot do is listed in the proof instead.
     """
     staircase = Staircase(profile, rate_hz=rate_hz)
-    chosen = Survey(profile).tracks if sink is None else Timed.tracks
-    tracer, tally = Tracer(profile), _Tally()
+    chosen = Survey(staircase.rig).tracks if sink is None else Timed.tracks
+    tracer, clearing, tally = Tracer(staircase.rig), Clearing(profile), _Tally()
     for step in staircase.timed(chunks):
-        if not isinstance(step, Timed):
+        if not isinstance(step, Timed | Shift):
             tally.command(step)
             continue
-        for checked in map(staircase.checked, chosen(step)):
+        for checked in _computed(staircase, step, chosen):
             tally.block(checked)
-            if sink is not None and not staircase.problems:
+            tally.collisions(clearing.problems(checked.setpoints))
+            if sink is not None and not (staircase.problems or tally.collided):
                 sink(checked.setpoints)
             if watch is not None:
                 watch(checked.setpoints)
-        if trace is not None and not staircase.problems:
-            for track in step.tracks():
-                trace(tracer.trace(track))
-    return tally.proof(staircase)
+        if trace is not None and not (staircase.problems or tally.collided):
+            for traced in tracer.traces(step):
+                trace(traced)
+    return tally.proof(staircase, clearing.warning)
+
+
+def _computed(
+    staircase: Staircase, step: Timed | Shift, chosen: Callable[[Timed], Iterator[ToolTrack]]
+) -> Iterator[Checked]:
+    if isinstance(step, Shift):
+        yield staircase.shifted(step)
+    else:
+        yield from map(staircase.checked, chosen(step))
 
 
 @dataclass(slots=True)
@@ -106,6 +119,7 @@ class _Tally:
     extruded: float = 0.0
     duration: float = 0.0
     pauses: int = 0
+    collided: int = 0
     problems: dict[tuple[int | None, str | None], Problem] = field(default_factory=dict)
     layers: list[tuple[int, int]] = field(default_factory=list)
     warnings: list[Problem] = field(default_factory=list)
@@ -114,9 +128,7 @@ class _Tally:
     def block(self, checked: Checked) -> None:
         """Take in a block of setpoints."""
         for problem in checked.problems:
-            place = problem.line, problem.key
-            if place in self.problems or len(self.problems) < MAX_LISTED:
-                self.problems[place] = problem
+            self._list(problem)
         rows = checked.setpoints
         if not len(rows):
             return
@@ -127,6 +139,17 @@ class _Tally:
                 self._widen(
                     name, (float(values[low]), int(rows.line[low]), float(values[high]), int(rows.line[high]))
                 )
+
+    def collisions(self, found: list[Problem]) -> None:
+        """Take in collisions of cables."""
+        self.collided += len(found)
+        for problem in found:
+            self._list(problem)
+
+    def _list(self, problem: Problem) -> None:
+        place = problem.line, problem.key or problem.message.split(" would")[0]
+        if place in self.problems or len(self.problems) < MAX_LISTED:
+            self.problems[place] = problem
 
     def _widen(self, name: str, found: Extreme) -> None:
         known = self.extremes.get(name, found)
@@ -177,7 +200,7 @@ class _Tally:
     def _(self, _: Dwell | Stop | Blend) -> None:
         """Adds nothing of its own; its time is in the setpoints."""
 
-    def proof(self, staircase: Staircase) -> Proof:
+    def proof(self, staircase: Staircase, collision: Problem | None) -> Proof:
         """All of it."""
         return Proof(
             lines=staircase.lines,
@@ -186,9 +209,9 @@ class _Tally:
             path=self.path,
             extruded=self.extruded,
             problems=tuple(self.problems.values()),
-            total_problems=staircase.problems,
+            total_problems=staircase.problems + self.collided,
             extremes=self.extremes,
             layers=tuple(self.layers),
             pauses=self.pauses,
-            warnings=tuple(self.warnings),
+            warnings=(*self.warnings, *([collision] if collision else [])),
         )

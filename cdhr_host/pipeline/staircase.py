@@ -8,11 +8,13 @@ import numpy as np
 
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.extrusion import air_command
-from cdhr_host.mechanism import Cables, Loads, cable_state, direction_change_bound, slider
-from cdhr_host.motion.limits import MotionLimits, profile_shaper
+from cdhr_host.mechanism import UpperMotion
+from cdhr_host.motion.limits import profile_shaper
 from cdhr_host.motion.planner import Planner
 from cdhr_host.motion.sampling import Timed, Timeline
 from cdhr_host.pipeline.audit import Audit, on_bed
+from cdhr_host.pipeline.rig import Rig
+from cdhr_host.pipeline.shift import SAME, Shift, nozzle_standing, shift
 from cdhr_host.profile import Profile
 from cdhr_host.program import Interpreter, Modal
 from cdhr_host.values import Array, Command, Pause, Setpoints, ToolTrack
@@ -35,14 +37,14 @@ class Staircase:
 
     def __init__(self, profile: Profile, *, rate_hz: float | None = None) -> None:
         self.profile = profile
-        self._cables = Cables.from_profile(profile)
-        self._loads = Loads.from_profile(profile)
+        self.rig = Rig.from_profile(profile)
         self._period = profile.drives.period if rate_hz is None else 1.0 / rate_hz
-        self._limits = MotionLimits.from_profile(profile, direction_change_bound(profile))
+        self._limits = self.rig.limits()
         self._audit = Audit(profile)
         self._timeline = Timeline(self._period, profile_shaper(self.profile))
-        self._planner = Planner(self._limits, self._cables.reference_G)
-        self._interpreter = Interpreter(profile, at_G=self._cables.reference_G)
+        self._planner = Planner(self._limits, self.rig.cables.reference_G)
+        self._interpreter = Interpreter(profile, at_G=self.rig.cables.reference_G)
+        self._offset = np.zeros(3)
 
     @property
     def lines(self) -> int:
@@ -68,13 +70,16 @@ class Staircase:
         )
         self._interpreter.modal = replace(self._interpreter.modal, position=(x, y, z), onward=None)
 
-    def timed(self, chunks: Iterable[bytes]) -> Iterator[Command | Timed]:
+    def timed(self, chunks: Iterable[bytes], *, ends: bool = True) -> Iterator[Command | Timed | Shift]:
         """Each command of a text, after the stretches it settles; ends at rest.
 
+        First the upper platform goes where the spring policy wants it; if this text ``ends`` the
+        job at the reference pose, it goes back to its reference offset at last.
         Before a Pause comes everything up to rest. Raises ProgramError, after the last line,
         for text that is not understood.
         """
         self._audit = Audit(self.profile)
+        yield from self._shift(self._wanted())
         for command in self._interpreter.commands(chunks):
             for stretch in self._planner.stretches(command):
                 yield self._timeline.lay(stretch)
@@ -84,19 +89,24 @@ class Staircase:
         for stretch in self._planner.close():
             yield self._timeline.lay(stretch)
         yield self._timeline.rest(self._planner.standing)
+        self._offset = self._wanted()
+        if ends and self._at_reference():
+            yield from self._shift(np.zeros(3))
 
-    def walk(self, chunks: Iterable[bytes]) -> Iterator[Command | Checked]:
+    def walk(self, chunks: Iterable[bytes], *, ends: bool = True) -> Iterator[Command | Checked]:
         """As ``timed``, with every setpoint of each stretch in its place."""
-        for step in self.timed(chunks):
+        for step in self.timed(chunks, ends=ends):
             if isinstance(step, Timed):
                 for track in step.tracks():
                     yield self.checked(track)
+            elif isinstance(step, Shift):
+                yield self.shifted(step)
             else:
                 yield step
 
-    def setpoints(self, chunks: Iterable[bytes]) -> Iterator[Setpoints]:
+    def setpoints(self, chunks: Iterable[bytes], *, ends: bool = True) -> Iterator[Setpoints]:
         """Setpoints only; raises MotionError at the first the machine cannot do."""
-        for step in self.walk(chunks):
+        for step in self.walk(chunks, ends=ends):
             if isinstance(step, Checked):
                 if step.problems:
                     raise MotionError(step.problems)
@@ -104,11 +114,11 @@ class Staircase:
 
     def prepare(self, chunks: Iterable[bytes]) -> list[Setpoints]:
         """All setpoints of a short text, or a refusal that leaves the machine as it was."""
-        before = copy.deepcopy((self._planner, self._timeline)), self._interpreter.modal
+        before = copy.deepcopy((self._planner, self._timeline, self._offset)), self._interpreter.modal
         try:
-            return list(self.setpoints(chunks))
+            return list(self.setpoints(chunks, ends=False))
         except BaseException:
-            (self._planner, self._timeline), self._interpreter.modal = before
+            (self._planner, self._timeline, self._offset), self._interpreter.modal = before
             raise
 
     def checked(self, track: ToolTrack) -> Checked:
@@ -117,19 +127,47 @@ class Staircase:
         problems = self._audit.places(track)
         if not inside.all():
             track = track[inside]
-        q = track.position_G - self._cables.reference_G
-        state = cable_state(self._cables, self._loads, q, q, track.velocity, track.acceleration)
+        q, upper = self.rig.follow(track)
+        return self._audited(track, q, upper, problems)
+
+    def shifted(self, step: Shift) -> Checked:
+        """As ``checked``, for the upper platform moving alone."""
+        q = step.track.position_G - self.rig.cables.reference_G
+        return self._audited(step.track, q, step.upper, [])
+
+    def _audited(self, track: ToolTrack, q: Array, upper: UpperMotion, problems: list[Problem]) -> Checked:
+        state = self.rig.state(q, track, upper)
         air = air_command(track.flow, track.air, self.profile.extruder)
         setpoints = Setpoints(
             tick=track.tick,
             t=(track.tick * self._period).astype(np.float64),
             line=track.line,
             nozzle_G=track.position_G,
-            upper=q,
-            slider=slider(self._cables, state.length),
+            upper=upper.place,
+            slider=self.rig.sliders(state.length, state.tension),
             tension=state.tension,
             flow=air.flow,
             pressure=air.pressure,
         )
-        problems += self._audit.motion(track, state, setpoints)
+        nine = self.rig.nine(q, track, upper)
+        problems += self._audit.motion(track, state, nine, setpoints)
         return Checked(setpoints, tuple(problems))
+
+    def _wanted(self) -> Array:
+        """(3,) m: the offset the policy wants where the nozzle stands."""
+        q = self._planner.standing.at_G - self.rig.cables.reference_G
+        offset: Array = self.rig.policy.upper(q[None])[0] - q
+        return offset
+
+    def _at_reference(self) -> bool:
+        away = self._planner.standing.at_G - self.rig.cables.reference_G
+        return bool(np.linalg.norm(away) < SAME)
+
+    def _shift(self, offset: Array) -> Iterator[Shift]:
+        """Take the upper platform to another offset."""
+        standing = self._planner.standing
+        way = shift(self.rig, standing.at_G, (self._offset, offset), self._period)
+        self._offset = offset
+        if way is not None:
+            ticks = self._timeline.reserve(len(way.place))
+            yield Shift(nozzle_standing(standing, ticks), way)

@@ -16,26 +16,21 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cdhr_host.mechanism import (
-    Cables,
-    Loads,
-    affine_tensions,
-    direction_change_bound,
-    lengths,
-    slider,
-    tension_slopes,
-)
+from cdhr_host.mechanism import affine_nine_tensions
 from cdhr_host.motion.bounds import LegBounds, leg_bounds
 from cdhr_host.motion.leg import Leg
 from cdhr_host.motion.sampling import BLOCK, Stand, Timed
 from cdhr_host.pipeline.audit import ROUNDING, on_bed
-from cdhr_host.profile import Profile
+from cdhr_host.pipeline.rig import Rig
+from cdhr_host.profile import Extruder
 from cdhr_host.values import Array, Flags, Ints, ToolTrack
 
 SPACING = 2e-3
 """m along the path"""
 GRID = (9, 7, 9)
 """places in radius, azimuth and height at which the slope of the forces is evaluated"""
+STEP = 1e-5
+"""m, of the differences that give the slope"""
 STEEPER = 1.2
 """how much steeper than at any of these places the forces may be in between"""
 
@@ -43,14 +38,13 @@ STEEPER = 1.2
 class Survey:
     """Chooses the ticks that prove a stretch."""
 
-    def __init__(self, profile: Profile) -> None:
-        self._profile = profile
-        self._cables = Cables.from_profile(profile)
-        self._loads = Loads.from_profile(profile)
-        self._bend = direction_change_bound(profile)
-        forces, margin = profile.forces, force_slope(profile) * SPACING / 2
-        self._least = np.repeat([forces.lower_min, forces.upper_min], 3) + margin
-        self._greatest = np.repeat([forces.lower_max, forces.upper_max], 3) - margin
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self._profile = rig.profile
+        forces, margin = rig.profile.forces, force_slope(rig) * SPACING / 2
+        least = [forces.lower_min] * 3 + [forces.single_min] * 6 + [forces.upper_min] * 3
+        greatest = [forces.lower_max] * 3 + [forces.single_max] * 6 + [forces.upper_max] * 3
+        self._least, self._greatest = np.array(least) + margin, np.array(greatest) - margin
 
     def tracks(self, timed: Timed) -> Iterator[ToolTrack]:
         """Samples of a stretch that prove all of it, in blocks."""
@@ -75,14 +69,16 @@ class Survey:
     def _within(self, leg: Leg, found: LegBounds) -> bool:
         """Whether bounds alone keep a leg on the bed and inside the limits of nozzle, sliders and air."""
         limits, sliders, extruder = self._profile.limits, self._profile.sliders, self._profile.extruder
-        turning = self._bend * found.speed**2
-        pressure = extruder.pressure_threshold + extruder.pressure_slope * found.flow
+        upper, pressure = self._rig.upper, _pressure(found, extruder)
+        fast = upper.slope * found.speed
+        hard = upper.slope * found.acceleration + upper.bend * found.speed**2
         slack = 1 + ROUNDING
         return (
             found.over_feed <= slack
-            and found.speed <= min(limits.speed_max, sliders.speed_max) * slack
+            and found.speed <= limits.speed_max * slack
+            and fast <= sliders.speed_max * slack
             and found.acceleration <= limits.acceleration_max * slack
-            and found.acceleration + turning <= sliders.acceleration_max * slack
+            and hard + self._rig.bend * fast**2 <= sliders.acceleration_max * slack
             and found.jerk <= limits.jerk_max * slack
             and max(pressure, found.air) <= extruder.pressure_max
             and bool(on_bed(leg.segments.points, self._profile).all())
@@ -90,28 +86,48 @@ class Survey:
 
     def _certain(self, track: ToolTrack, found: LegBounds) -> Flags:
         """(N,) whether forces and travel are proven between here and a neighbour that is certain too."""
-        q = track.position_G - self._cables.reference_G
-        affine = affine_tensions(self._cables, self._loads, q, q)
-        swing = np.concatenate((_row_norms(affine.lower), _row_norms(affine.upper)), axis=1)
-        low, high = affine.rest - swing * found.acceleration, affine.rest + swing * found.acceleration
-        travel, sliders = slider(self._cables, lengths(self._cables, q, q)), self._profile.sliders
-        pulled = (low >= self._least) & (high <= self._greatest)
-        held = (travel >= sliders.travel_min + SPACING) & (travel <= sliders.travel_max - SPACING)
-        return np.asarray((pulled & held).all(axis=1), dtype=np.bool_)
+        rig = self._rig
+        q, upper = rig.follow(track)
+        rest, below, above = _affine(rig, q, upper.place)
+        hard = rig.upper.slope * found.acceleration + rig.upper.bend * found.speed**2
+        swing = np.hstack((_row_norms(below) * found.acceleration, _row_norms(above) * hard))
+        pulled = (rest - swing >= self._least) & (rest + swing <= self._greatest)
+        travel, sliders = rig.slider_places(track), self._profile.sliders
+        margin = rig.upper.slope * SPACING
+        held = (travel >= sliders.travel_min + margin) & (travel <= sliders.travel_max - margin)
+        return np.asarray(pulled.all(axis=1) & held.all(axis=1), dtype=np.bool_)
 
 
-def force_slope(profile: Profile) -> float:
+def _pressure(found: LegBounds, extruder: Extruder) -> float:
+    return extruder.pressure_threshold + extruder.pressure_slope * found.flow
+
+
+def _affine(rig: Rig, q: Array, place: Array) -> tuple[Array, Array, Array]:
+    """Pairs, single cables, upper cables: resting forces (N, 12), gains (N, 9, 3) and (N, 3, 3)."""
+    nine = affine_nine_tensions(rig.cables, rig.loads, rig.pairs, q, place)
+    rest = np.hstack((nine.rest[:, :3] + nine.rest[:, 3:6], nine.rest))
+    below = np.concatenate((nine.lower[:, :3] + nine.lower[:, 3:], nine.lower), axis=1)
+    return rest, below, nine.upper
+
+
+def force_slope(rig: Rig) -> float:
     """N/m: the most a resting cable force changes for each metre of nozzle travel on the bed."""
-    bed, cables = profile.bed, Cables.from_profile(profile)
+    bed = rig.profile.bed
     radius, azimuth, height = np.meshgrid(
         np.linspace(0.0, bed.radius, GRID[0]),
         np.linspace(0.0, 2 * np.pi / 3, GRID[1]),
         np.linspace(0.0, bed.height, GRID[2]),
     )
     places = np.stack((radius * np.cos(azimuth), radius * np.sin(azimuth), height), axis=-1).reshape(-1, 3)
-    q = places - cables.reference_G
-    by_lower, by_upper = tension_slopes(cables, Loads.from_profile(profile), q, q)
-    return STEEPER * float(_row_norms(by_lower + by_upper).max())
+    q = places - rig.cables.reference_G
+    ways = STEP * np.eye(3)
+    gradient = [(_resting(rig, q + way) - _resting(rig, q - way)) / (2 * STEP) for way in ways]
+    return STEEPER * float(np.sqrt(sum(part**2 for part in gradient)).max())
+
+
+def _resting(rig: Rig, q: Array) -> Array:
+    """(N, 3) m -> (N, 12) N."""
+    return _affine(rig, q, rig.policy.upper(q))[0]
 
 
 def _row_norms(gain: Array) -> Array:

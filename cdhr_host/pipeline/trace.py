@@ -1,12 +1,12 @@
 """What a compact log holds of each tick: where sliders and nozzle are, and the air."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-import numpy as np
-
 from cdhr_host.extrusion import air_command
-from cdhr_host.mechanism import Cables, lengths
-from cdhr_host.profile import Profile
+from cdhr_host.motion.sampling import Timed
+from cdhr_host.pipeline.rig import Rig
+from cdhr_host.pipeline.shift import Shift
 from cdhr_host.values import Array, Ints, ToolTrack
 
 
@@ -29,14 +29,17 @@ class Trace:
 class Tracer:
     """Samples of the nozzle -> traces; the same numbers as the setpoints', without the forces."""
 
-    def __init__(self, profile: Profile) -> None:
-        self._cables = Cables.from_profile(profile)
-        self._extruder = profile.extruder
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
 
-    def trace(self, track: ToolTrack) -> Trace:
-        """A block of samples, all within reach."""
-        q = track.position_G - self._cables.reference_G
-        air = air_command(track.flow, track.air, self._extruder)
-        length = lengths(self._cables, q, q)
-        slider = np.subtract(length, self._cables.reference_lengths, out=length)
+    def traces(self, step: Timed | Shift) -> Iterator[Trace]:
+        """Every tick, in blocks, all within reach."""
+        if isinstance(step, Shift):
+            yield self._trace(step.track, self._rig.shifted_sliders(step.track, step.upper))
+        else:
+            for track in step.tracks():
+                yield self._trace(track, self._rig.slider_places(track))
+
+    def _trace(self, track: ToolTrack, slider: Array) -> Trace:
+        air = air_command(track.flow, track.air, self._rig.profile.extruder)
         return Trace(track.tick, track.line, track.position_G, slider, air.pressure)

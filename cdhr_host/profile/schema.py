@@ -44,7 +44,8 @@ class PathRules(Section):
         float, key("stop_angle_deg", "corners sharper than this are exact stops", gt=0, le=180), IN_DEG
     ]
     shaper: Annotated[
-        Literal["none", "zv", "mzv", "ei"], Field(description="input shaper against ringing; none leaves the motion as planned")
+        Literal["none", "zv", "mzv", "ei"],
+        Field(description="input shaper against ringing; none leaves the motion as planned"),
     ] = "none"
     shaper_frequency: Annotated[
         float, key("shaper_frequency_hz", "frequency of the mode the shaper cancels", ge=0.5, le=500)
@@ -93,6 +94,10 @@ class Bed(Section):
         ),
         IN_MM,
     ]
+    clearance: Annotated[
+        Literal["refuse", "warn"],
+        Field(description="what a cable running into the bed or the print does to a program"),
+    ] = "refuse"
 
 
 class Extruder(Section):

@@ -202,3 +202,16 @@ def test_moves_values_are_read_only():
     assert isinstance(command, Moves)
     with pytest.raises(ValueError, match="read-only"):
         command.end_G[0, 0] = 1.0
+
+
+def test_position_does_not_jump_where_a_leg_is_planned_in_parts(run, limits):
+    """A long row of nearly straight moves, whose turns are mostly too small to be corners."""
+    rng = np.random.default_rng(7)
+    steps = np.column_stack((np.full(3 * BATCH, 2e-3), rng.normal(size=(3 * BATCH, 2)) * 1e-12))
+    steps[::50, 1] += 1e-4
+    points = np.cumsum(np.vstack((np.zeros(3), steps)), axis=0)
+    track = run([moves(points, 0.1)], period=1e-3)
+    _, acceleration, jerk = differences(track, 1e-3)
+    assert acceleration <= limits.acceleration * 1.001
+    assert jerk <= limits.jerk * 1.001
+    assert np.allclose(track.position_G[-1], points[-1], atol=1e-11)

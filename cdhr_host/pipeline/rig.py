@@ -1,0 +1,100 @@
+"""The machine as the staircase sees it: nozzle motion in, both platforms, cables and forces out."""
+
+from dataclasses import dataclass
+
+from cdhr_host.mechanism import (
+    Cables,
+    Give,
+    Loads,
+    Pairs,
+    Policy,
+    UpperBounds,
+    UpperMotion,
+    cable_state,
+    direction_change_bound,
+    lengths,
+    nine_tensions,
+    slider,
+    tensions,
+    upper_bounds,
+)
+from cdhr_host.motion.limits import MotionLimits
+from cdhr_host.profile import Profile
+from cdhr_host.values import Array, CableState, ToolTrack
+
+
+@dataclass(frozen=True, slots=True)
+class Rig:
+    """A profile made ready for the formulas."""
+
+    profile: Profile
+    cables: Cables
+    loads: Loads
+    pairs: Pairs
+    policy: Policy
+    upper: UpperBounds
+    bend: float
+    """1/m, of ``direction_change_bound``"""
+    give: Give | None
+    """the cables' stretch, where setpoints allow for it"""
+
+    @classmethod
+    def from_profile(cls, profile: Profile) -> "Rig":
+        """Fits the spring policy, which may take half a second the first time."""
+        policy = Policy.from_profile(profile)
+        return cls(
+            profile,
+            Cables.from_profile(profile),
+            Loads.from_profile(profile),
+            Pairs.from_profile(profile),
+            policy,
+            upper_bounds(profile, policy),
+            direction_change_bound(profile),
+            Give.from_profile(profile) if profile.stretch.compensation == "on" else None,
+        )
+
+    def limits(self) -> MotionLimits:
+        """Limits of the nozzle that keep those of the sliders; raises MotionError where there are none."""
+        return MotionLimits.from_profile(self.profile, self.bend, self.upper)
+
+    def follow(self, track: ToolTrack) -> tuple[Array, UpperMotion]:
+        """(N, 3) m, the nozzle platform's displacement, and the upper platform's motion."""
+        q = track.position_G - self.cables.reference_G
+        return q, self.policy.follow(q, track.velocity, track.acceleration)
+
+    def state(self, q: Array, track: ToolTrack, upper: UpperMotion) -> CableState:
+        """Six equivalent cables at N samples; raises MotionError out of reach."""
+        return cable_state(
+            self.cables,
+            self.loads,
+            q,
+            upper.place,
+            track.velocity,
+            track.acceleration,
+            upper_velocity=upper.velocity,
+            upper_acceleration=upper.acceleration,
+        )
+
+    def nine(self, q: Array, track: ToolTrack, upper: UpperMotion) -> Array:
+        """(N, 9) N: left and right cables of the pairs, then the upper ones. Eq. (13), (14)."""
+        motion = track.acceleration, upper.acceleration
+        return nine_tensions(self.cables, self.loads, self.pairs, q, upper.place, *motion)
+
+    def sliders(self, length: Array, tension: Array) -> Array:
+        """(N, 6) m, (N, 6) N -> (N, 6) m: where the sliders stand."""
+        rigid = slider(self.cables, length)
+        return rigid if self.give is None else rigid + self.give.slider_correction(tension)
+
+    def slider_places(self, track: ToolTrack) -> Array:
+        """(N, 6) m: as ``sliders``, with no more worked out than that needs."""
+        _, upper = self.follow(track)
+        return self.shifted_sliders(track, upper)
+
+    def shifted_sliders(self, track: ToolTrack, upper: UpperMotion) -> Array:
+        """The same for an upper platform with a motion of its own."""
+        q = track.position_G - self.cables.reference_G
+        length = lengths(self.cables, q, upper.place)
+        if self.give is None:
+            return slider(self.cables, length)
+        motion = track.acceleration, upper.acceleration
+        return self.sliders(length, tensions(self.cables, self.loads, q, upper.place, *motion))
