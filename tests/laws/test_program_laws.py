@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from cdhr_host.errors import ProgramError
 from cdhr_host.profile import read_table, validate
 from cdhr_host.program import WORDS, Block, Interpreter, Word, parse_line, print_block
-from cdhr_host.values import Arc, Command, Moves, Prime
+from cdhr_host.values import Arc, Command, Moves, Prime, Spline
 
 ROOT = Path(__file__).resolve().parents[2]
 PROFILE = validate(read_table(ROOT / "profiles" / "paper-wide.toml"))[0]
@@ -53,6 +53,7 @@ def straight_lines(draw: st.DrawFn) -> str:
 OTHER_LINES = """
 G20|G21|G90|G91|G92|G92 E0|G92 X3 E1|M82|M83|M200 D1.75|M200 D0|M220 S50|M221 S120|M3 S100|M5|G28
 ;LAYER:1|; note||G4 P10|M117 hi|G2 X5 I2.5|G3 X1 Y1 R9|M400|G6|M84|M2
+G17|G18|G19|G2 X3 Z2 I1 K1|G3 Y1 K2|G5 X2 Y1 I1 J2 P-1 Q2 E1|G5 X5 P1 Q1|G5.1 X2 I1 J3|G61|G64|G64 P.1
 """
 other_lines = st.sampled_from([word for row in OTHER_LINES.split("\n") for word in row.split("|")])
 texts = st.lists(st.one_of(straight_lines(), straight_lines(), other_lines), max_size=25)
@@ -108,17 +109,25 @@ def test_the_fast_reader_and_the_parser_mean_the_same(lines: list[str]) -> None:
     assert outcome([fast.encode()]) == outcome([parsed.encode()])
 
 
+def ends(item: Command) -> tuple[list[float], list[float]] | None:
+    """Where a command that moves begins and ends."""
+    if isinstance(item, Spline):
+        return item.control_G[0].tolist(), item.control_G[3].tolist()
+    if isinstance(item, Moves | Arc):
+        return item.start_G.tolist(), np.atleast_2d(item.end_G)[-1].tolist()
+    return None
+
+
 @given(texts)
 def test_the_path_has_no_gaps(lines: list[str]) -> None:
-    motions = [item for item in commands_of(lines) if isinstance(item, Moves | Arc)]
-    for before, after in pairwise(motions):
-        assert np.atleast_2d(before.end_G)[-1].tolist() == after.start_G.tolist()
+    for before, after in pairwise(filter(None, map(ends, commands_of(lines)))):
+        assert before[1] == after[0]
 
 
 @given(texts)
 def test_clay_and_feeds_are_never_negative(lines: list[str]) -> None:
     for item in commands_of(lines):
-        if isinstance(item, Moves | Arc):
+        if isinstance(item, Moves | Arc | Spline):
             assert np.all(np.asarray(item.clay) >= 0)
             assert np.all(np.asarray(item.speed) > 0)
         if isinstance(item, Moves):
