@@ -1,4 +1,4 @@
-"""Runs the fault cases; ``python tests/drives/fault_runs.py`` writes docs/faults.md from what came of them."""
+"""Runs the fault cases; ``python tests/drives/fault_runs.py`` writes docs/faults.md from them."""
 
 import sys
 import time

@@ -1,0 +1,115 @@
+"""The cyclic sender on a pseudo-terminal: lateness, skipped cycles, CPU of the sender.
+
+    python benchmarks/drives.py --seconds 60 --hz 250
+    python benchmarks/drives.py --seconds 300 --hz 500
+
+At 500 Hz the drives answer every fourth SYNC. Needs an otherwise idle machine; real-time priority
+is used where it is allowed.
+"""
+
+import argparse
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from cdhr_host.drives import MonotonicClock
+from cdhr_host.drives.sender import SenderLink
+from cdhr_host.job import stream
+from cdhr_host.profile import find, read_table, validate
+from cdhr_host.values import Setpoints
+
+REPOSITORY = Path(__file__).resolve().parents[1]
+TICK = os.sysconf("SC_CLK_TCK")
+
+
+def profile_at(hz, folder):
+    """Path of a profile with this rate; at more than 250 Hz with reduced feedback."""
+    text = find("paper").read_text(encoding="utf-8")
+    text = text.replace("period_ms = 4.0", f"period_ms = {1e3 / hz:g}")
+    if hz > 250:
+        text = text.replace("feedback_every = 1", "feedback_every = 4")
+    path = folder / "bench.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def rows(count, period):
+    """A slow wave from rest to rest on all sliders, in batches."""
+    duration = (count - 2) * period
+    for first in range(0, count, 250):
+        tick = np.arange(first, min(first + 250, count))
+        z = np.clip(tick * period / duration, 0.0, 1.0)
+        s = z - np.sin(2 * np.pi * z) / (2 * np.pi)
+        turns = max(1, int(duration / 20.0))
+        nozzle = 0.02 * np.sin(2 * np.pi * turns * s)[:, None] * np.array([1.0, 0.7, 0.4])
+        slider = np.hstack([nozzle, -nozzle])
+        size = len(tick)
+        yield Setpoints(
+            tick=tick,
+            t=tick * period,
+            line=np.ones(size, dtype=np.int64),
+            nozzle_G=nozzle,
+            upper=nozzle.copy(),
+            slider=slider,
+            tension=np.full((size, 6), 6.0),
+            flow=np.zeros(size),
+            pressure=np.zeros(size),
+        )
+
+
+def cpu(pid):
+    """S of processor time of a process."""
+    values = Path(f"/proc/{pid}/stat").read_text().rsplit(") ", 1)[1].split()
+    return (int(values[11]) + int(values[12])) / TICK
+
+
+def measure(seconds, hz):
+    """One run; a record."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        path = profile_at(hz, folder)
+        profile, _ = validate(read_table(path))
+        record = folder / "received.csv"
+        command = [sys.executable, "-m", "cdhr_host", "sim", "--profile", str(path), "--record", str(record)]
+        far = subprocess.Popen(command, cwd=REPOSITORY, stdout=subprocess.PIPE, text=True)
+        url = far.stdout.readline().strip()
+        link = SenderLink(url, profile, folder / "references.json")
+        link.open()
+        count = int(seconds * hz)
+        before = cpu(link.pid)
+        summary = stream(rows(count, profile.drives.period), link, MonotonicClock(), start=np.zeros(6))
+        used = cpu(link.pid) - before
+        link.close()
+        far.send_signal(signal.SIGTERM)
+        far.wait()
+        timing = summary.timing
+        return {
+            "hz": hz,
+            "cycles": timing.cycles,
+            "real_time": timing.real_time,
+            "p50_ms": round(timing.p50 * 1e3, 3),
+            "p99_ms": round(timing.p99 * 1e3, 3),
+            "p999_ms": round(timing.p999 * 1e3, 3),
+            "max_ms": round(timing.max * 1e3, 3),
+            "skipped": timing.skipped,
+            "sender_cpu_percent": round(100 * used / summary.duration, 1),
+            "lost_ticks": json.loads(record.with_suffix(".json").read_text())["lost_ticks"],
+        }
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--hz", type=int, default=250)
+    arguments = parser.parse_args()
+    print(json.dumps(measure(arguments.seconds, arguments.hz)))
+
+
+if __name__ == "__main__":
+    main()
