@@ -15,6 +15,7 @@ from cdhr_host.plant.bodies import Build
 from cdhr_host.report.paper import FIGURES, ITEMS, TABLES, Cell, Item, Study, experiment, item_name, reproduce
 from cdhr_host.report.paper.driven import Drive, driven
 from cdhr_host.report.paper.page import number, page, totals
+from cdhr_host.report.paper.spools import worst_with_spools
 from cdhr_host.report.reproduce import PAGE, names_of, study, write
 
 QUICK = study(seeds=2, thorough=False)
@@ -93,6 +94,24 @@ def test_quick_items_find_what_the_study_found(name: str) -> None:
     known_exception = "lead of screws 0.1 %: plane"
     assert [text for text in disagreeing(item) if not text.startswith(known_exception)] == []
     assert len(item.why) > 20
+
+
+@pytest.mark.parametrize("name", ["table-1", "table-2"])
+def test_tables_are_whole_even_when_short(name: str) -> None:
+    item = ITEMS[name](study(seeds=1, thorough=False))
+    assert disagreeing(item) == []
+    assert {panel.title.split()[2].strip(",") for panel in item.panels} == {"plane", "height"}
+    printed = [cell for cell in item.cells if cell.ratio is not None]
+    assert len(printed) >= 10
+    assert all(np.isfinite(cell.ours) for cell in item.cells)
+
+
+def test_spools_slow_the_swing() -> None:
+    """Eq. (16) fed forward: between 1.25 and 1.54 mm in x for spools of 0.01 to 10 kg."""
+    light, heavy = (worst_with_spools(SIMULATION, spool, 60.0) for spool in (0.0, 1.0))
+    assert heavy[0] < light[0]
+    run = driven(SIMULATION, Drive(PULLEYS["point"], seconds=60.0))
+    assert_allclose(light, run.worst, rtol=2e-3)
 
 
 def test_figures_and_tables_are_all_there() -> None:

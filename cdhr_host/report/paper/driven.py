@@ -15,6 +15,7 @@ from cdhr_host.plant.strands import Strands
 from cdhr_host.plant.turning import Turn
 from cdhr_host.profile import Profile
 from cdhr_host.report.paper.items import Cell, Item, Panel, Study, cells
+from cdhr_host.report.paper.spools import worst_with_spools
 from cdhr_host.units import MM
 from cdhr_host.values import Array
 
@@ -161,6 +162,9 @@ def errors(study: Study) -> Item:
         run = driven(profile, drive)
         found += _close(run.worst, printed, expected, reading, share)
         panels.append(_error_panel(reading, run))
+    for spool, expected in ((0.01, "1.54 1.23 13.1"), (1.0, "1.25 1.03 13.1")):
+        reading = f"not compensated, swivel, spools of I/r² = {spool:g} kg with Eq. (16) fed forward"
+        found += _close(worst_with_spools(profile, spool), "1.213 1.228 16.514", expected, reading, 0.015)
     why = (
         "Nothing accumulates: the platform swings, undamped, at 0.65 to 0.80 Hz about a static offset. Our "
         "uncompensated z is 21 % lower than printed, the compensated z 0.035 is not reached by any reading; "
