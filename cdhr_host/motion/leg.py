@@ -21,6 +21,8 @@ from cdhr_host.values import Array, Flags, Ints
 
 BATCH = 2048
 """Segments collected before a plan is made."""
+MORE_ROOM = 0.5
+"""Of the way that braking to rest takes, kept in hand when a leg is committed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +90,7 @@ class LegPlanner:
         self._first = 0.0
         self._entry: float | None = 0.0
         self._inside = False
+        self._passed = 0.0
 
     def add(self, segments: Segments) -> None:
         """Draw on; the segments begin where the last ones ended."""
@@ -112,7 +115,9 @@ class LegPlanner:
         span = (self._first, path.end if closes else path.end - h)
         if span[1] <= span[0]:
             return None
-        found = cells(path, segments.feed[path.segment], span, self._limits, inside=self._inside)
+        found = cells(
+            path, segments.feed[path.segment], span, self._limits, passed=self._passed, inside=self._inside
+        )
         speeds, forward = border_speeds(found, self._entry, None if rounded else 0.0)
         self._check_entry(speeds[0])
         count = len(found.start) if closes else _settled(found, speeds == forward)
@@ -141,6 +146,7 @@ class LegPlanner:
         self._planned = len(self._segments)
         self._opens = self._opens and first == 0
         self._first = border - drawn[first]
+        self._passed += float(drawn[first])
         self._entry = speed
         self._inside = bool(found.bent[count])
 
@@ -174,6 +180,16 @@ def _lengths(steps: Array) -> Array:
 
 
 def _settled(found: Cells, final: Flags) -> int:
-    """How many cells can be committed: up to the last border that nothing further can change."""
+    """How many cells can be committed: up to a border whose speed nothing further can raise.
+
+    Braking to rest begins at the last such border. What follows may instead end the leg in
+    a slower cell, and slowing down to a third of a speed takes 9 % more way than to rest; so
+    the border is taken that leaves MORE_ROOM beyond the way that rest would need.
+    """
     usable = np.flatnonzero(final[:-1] & (found.start < found.settled))
-    return int(usable[-1]) if len(usable) else 0
+    if not len(usable):
+        return 0
+    room = np.concatenate(([0.0], np.cumsum(np.where(found.acceleration > 0.0, found.length, 0.0))))
+    braking = room[-1] - room[usable[-1]]
+    early = usable[room[usable] <= room[usable[-1]] - MORE_ROOM * braking]
+    return int(early[-1]) if len(early) else 0

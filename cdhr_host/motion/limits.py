@@ -35,6 +35,8 @@ NEWTON_STEPS = 6
 """From the nearer of two bounds, less than 1.5 times the root, these reach it to rounding."""
 MERGE = 0.1
 """m, cells are merged up to this length, so that a long path has borders to stop at."""
+TOUCHING = 1e-12
+"""m, less is rounding."""
 CHORD_ERROR = 1e-6
 """m, how far the chords that stand for a curve may be from it."""
 
@@ -170,22 +172,30 @@ class _Pieces:
 
 
 def cells(
-    path: SmoothPath, feed: Array, span: tuple[float, float], limits: MotionLimits, *, inside: bool
+    path: SmoothPath,
+    feed: Array,
+    span: tuple[float, float],
+    limits: MotionLimits,
+    *,
+    passed: float,
+    inside: bool,
 ) -> Cells:
     """Cells of a path over a span of s.
 
     ``feed`` (K,) m/s is the programmed speed on each piece; ``inside`` says that the span
-    begins inside a long bend begun earlier.
+    begins inside a long bend begun earlier. A leg is divided where its length, of which
+    ``passed`` (m) lies before s = 0, is a multiple of a cell's; so it is divided alike
+    whenever it is planned again, and what could be braked from a border still can.
     """
     pieces = _between(path, feed, span)
-    group, roomy = _groups(pieces, limits.half_width, inside=inside)
+    group, roomy = _groups(pieces, limits.half_width, passed, inside=inside)
     heads = np.flatnonzero(np.diff(group, prepend=group[0] - 1))
     cap = np.minimum(np.minimum.reduceat(pieces.feed, heads), limits.speed)
     bend = np.maximum.reduceat(pieces.bend, heads)
     change = np.maximum.reduceat(pieces.change, heads)
     speed, share = _budget(cap, bend, change, roomy[heads], limits)
     settled = pieces.start[heads[-1]] if pieces.bent[-1] else span[1]
-    merged = _merge_heads(pieces.start[heads], speed, share)
+    merged = _merge_heads(pieces.start[heads] + passed, speed, share)
     length = np.add.reduceat(np.add.reduceat(pieces.length, heads), merged)
     heads, share = heads[merged], share[merged]
     a, j = share * limits.acceleration, share * limits.jerk
@@ -195,14 +205,15 @@ def cells(
 def _between(path: SmoothPath, feed: Array, span: tuple[float, float]) -> _Pieces:
     """The pieces of a path that lie in a span of s, cut at its ends."""
     ends = np.append(path.start[1:], path.end)
-    used = np.flatnonzero((ends > span[0]) & (path.start < span[1]))
+    first = span[0] + min(TOUCHING, (span[1] - span[0]) / 2)
+    used = np.flatnonzero((ends > first) & (path.start < span[1]))
     start = np.maximum(path.start[used], span[0])
     bend, change = (bound[used] for bound in path.bounds())
     length = np.minimum(ends[used], span[1]) - start
     return _Pieces(start, length, feed[used], bend, change, path.bending[used] > 0)
 
 
-def _groups(pieces: _Pieces, h: float, *, inside: bool) -> tuple[Ints, Flags]:
+def _groups(pieces: _Pieces, h: float, passed: float, *, inside: bool) -> tuple[Ints, Flags]:
     """(K,) cell number of each piece, and whether its bend is long.
 
     A short bend is one cell, a long one many; straights split where the feed changes, and
@@ -215,9 +226,9 @@ def _groups(pieces: _Pieces, h: float, *, inside: bool) -> tuple[Ints, Flags]:
     roomy = bent & (run_length > LONG_RUN * h)
     if inside:
         roomy |= bent & (run == 0)
-    part = np.where(roomy, np.floor((start - start[heads][run]) / (CELL * h)), 0.0)
+    part = np.where(roomy, _multiples(start + passed, CELL * h), 0.0)
     part = np.where(bent, part, np.cumsum(np.diff(pieces.feed, prepend=pieces.feed[0]) != 0))
-    stretch = np.where(bent, 0.0, np.floor((start - start[0]) / MERGE))
+    stretch = np.where(bent, 0.0, _multiples(start + passed, MERGE))
     columns = np.stack((run, part, stretch))
     change = (np.diff(columns, prepend=columns[:, :1]) != 0).any(axis=0)
     return np.cumsum(change), roomy
@@ -258,5 +269,11 @@ def _bend_speed(bend: Array, change: Array, share: float, limits: MotionLimits) 
 def _merge_heads(start: Array, speed: Array, share: Array) -> Ints:
     """First of each row of neighbouring cells with the same bounds, none longer than MERGE."""
     differs = (np.diff(speed, prepend=-1.0) != 0) | (np.diff(share, prepend=-1.0) != 0)
-    stretch = np.floor((start - start[0]) / MERGE)
-    return np.flatnonzero(differs | (np.diff(stretch, prepend=-1.0) != 0))
+    stretch = _multiples(start, MERGE)
+    return np.flatnonzero(differs | (np.diff(stretch, prepend=stretch[0] - 1.0) != 0))
+
+
+def _multiples(length: Array, cell: float) -> Array:
+    """(K,) m, m -> (K,): whole cells before each length; what rounding has put before a border is on it."""
+    cells: Array = np.floor((length + TOUCHING) / cell)
+    return cells
