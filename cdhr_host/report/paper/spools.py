@@ -1,7 +1,8 @@
 """Sect. 3.3 with the inertia of the spools, Eq. (16): two points on six cables that have to be sped up.
 
 A spool of inertia I takes m l'' of its motor's force f, m = I / r²: the cable pulls with
-T = f + m l''. The motors are told T - m l'' of the plan. With l'' = -e·a - e'·v the platform moves by (M + m Σ e eᵀ) a = Σ e (f - m e'·v) + load.
+T = f + m l''. The motors are told T - m l'' of the plan. With l'' = -e·a - e'·v the platform
+moves by (M + m Σ e eᵀ) a = Σ e (f - m e'·v) + load.
 """
 
 from typing import Final
