@@ -15,7 +15,7 @@ from cdhr_host.plant.disturbances import Slipped, Stuck
 
 ZERO = np.zeros(6)
 WALL = time.time
-ROWS = run_of(800, seed=5)
+ROWS = run_of(700, seed=5)
 SPOILT_AFTER = 200
 """ticks of undisturbed motion"""
 

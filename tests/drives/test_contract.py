@@ -81,7 +81,7 @@ def test_life_from_closed_to_closed(far):
 def test_everything_fed_comes_back_exactly_once_in_order(far):
     link, clock = far
     link.arm(ZERO)
-    rows = run_of(3000)
+    rows = run_of(1500)
     parts = [part for batch in cut(rows, [1, 250, 37]) for part in _feed_all(link, clock, batch)]
     feedback = joined([*parts, _drain(link, clock, lambda: link.buffered == 0)])
     assert (feedback.tick == rows.tick).all()
