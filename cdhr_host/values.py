@@ -20,8 +20,8 @@ Flags = NDArray[np.bool_]
 
 def _freeze(value: Any) -> None:
     """Make every array of a dataclass read-only."""
-    for field in fields(value):
-        item = getattr(value, field.name)
+    for each in fields(value):
+        item = getattr(value, each.name)
         if isinstance(item, np.ndarray):
             item.flags.writeable = False
 

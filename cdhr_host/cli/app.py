@@ -5,7 +5,18 @@ from typing import Annotated
 import typer
 
 from cdhr_host import __version__
-from cdhr_host.cli import compensation, drives, dry_run, generate, jog, profiles, reproduce, sim, stream
+from cdhr_host.cli import (
+    compensation,
+    drives,
+    dry_run,
+    generate,
+    jog,
+    profiles,
+    reproduce,
+    sim,
+    stream,
+    workspace,
+)
 from cdhr_host.cli.options import examples
 from cdhr_host.cli.refusals import RefusingGroup
 
@@ -34,6 +45,7 @@ app.add_typer(profiles.app, name="profile")
 app.add_typer(drives.app, name="drives")
 app.command("compensation", epilog=compensation.EXAMPLES)(compensation.compensation)
 app.command("reproduce", epilog=reproduce.EXAMPLES)(reproduce.reproduce)
+app.command("workspace", epilog=workspace.EXAMPLES)(workspace.workspace)
 app.add_typer(generate.app, name="generate")
 
 

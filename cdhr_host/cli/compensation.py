@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 EXAMPLES = examples(
     "cdhr compensation",
     "cdhr compensation --trajectory 36 --profile paper",
+    "cdhr compensation --models",
     "cdhr compensation --json",
 )
 
@@ -38,15 +39,25 @@ def compensation(
         float, typer.Option(metavar="S", help="Time between two samples.", min=1e-4, max=10)
     ] = 0.01,
     profile: ProfileName = "paper-simulation",
+    *,
+    models: Annotated[
+        bool, typer.Option("--models", help="Setpoints by each pulley model on a machine like each other.")
+    ] = False,
     json_: Json = False,
 ) -> None:
     """The nozzle's greatest error along a trajectory of the paper, with and without compensated pulleys."""
     from cdhr_host.report.compensation import compensation as compare
+    from cdhr_host.report.compensation import models as compare_models
     from cdhr_host.samples import LAWS
 
     law = LAWS[trajectory.value]
+    drawn = f"Eq. ({trajectory.value}) on {profile}: {law.drawing}, 0 <= t < {law.duration:g} s by {step:g} s"
     with about(profile):
-        found = compare(open_machine(profile), law.position(law.times(step)[:-1]))
+        machine, position = open_machine(profile), law.position(law.times(step)[:-1])
+        if models:
+            emit(_models(drawn, compare_models(machine, position), json_))
+            return
+        found = compare(machine, position)
     if json_:
         record = {
             "profile": profile,
@@ -59,11 +70,21 @@ def compensation(
         emit(json.dumps(record))
         return
     emit(
-        f"Eq. ({trajectory.value}) on {profile}: {law.drawing}, 0 <= t < {law.duration:g} s by {step:g} s\n"
+        f"{drawn}\n"
         f"greatest nozzle error, mm          x            y            z\n"
         f"setpoints |BA| (straight cable)    {_row(found.uncompensated, '.5f')}\n"
         f"setpoints round the pulleys        {_row(found.compensated, '.2e')}"
     )
+
+
+def _models(drawn: str, found: "dict[tuple[str, str], Array]", json_: bool) -> str:
+    if json_:
+        return json.dumps(
+            {f"{one} on {other}": (error / MM).tolist() for (one, other), error in found.items()}
+        )
+    rows = [f"{one:<12} {other:<12} {_row(error, '.5f')}" for (one, other), error in found.items()]
+    head = "setpoints by on a machine  greatest nozzle error in x, y, z, mm"
+    return "\n".join([drawn, head, *rows])
 
 
 def _row(error: "Array", form: str) -> str:

@@ -17,6 +17,7 @@ from cdhr_host.cli.source import Source
 if TYPE_CHECKING:
     from cdhr_host.drives import Clock, MachineLink
     from cdhr_host.job import RunSummary
+    from cdhr_host.job.closed_loop import Loop
     from cdhr_host.pipeline import Checked, Proof
     from cdhr_host.profile import Profile
     from cdhr_host.report.log import RunLog
@@ -38,6 +39,8 @@ class Run:
     stop: StopRequest
     waits: bool
     """whether pauses wait for the operator"""
+    loop: "Loop | None" = None
+    """the simulated machine's control loop, where there is one"""
 
 
 class Stretches:
@@ -90,6 +93,7 @@ def _stretches(
     import numpy as np
 
     from cdhr_host.job import stream
+    from cdhr_host.job.closed_loop import closed_loop
 
     start = np.zeros(6)
 
@@ -99,9 +103,10 @@ def _stretches(
         done(rows, feedback)
 
     while True:
-        summary = stream(
-            program.following(), run.link, run.clock, start=start, on_rows=note, should_stop=run.stop
-        )
+        rows = program.following()
+        if run.loop is not None:
+            rows = closed_loop(rows, run.loop, run.machine, say)
+        summary = stream(rows, run.link, run.clock, start=start, on_rows=note, should_stop=run.stop)
         over = summary.interrupted or program.pause is None
         if not over and program.pause is not None and run.waits and not _goes_on(program.pause, run.stop):
             over, summary = True, replace(summary, interrupted=True)

@@ -2,6 +2,7 @@
 
 import json
 import sys
+from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -15,14 +16,25 @@ from cdhr_host.cli.refusals import INTERRUPTED, Refusal, about, emit
 from cdhr_host.cli.source import Source
 
 if TYPE_CHECKING:
+    from cdhr_host.job.closed_loop import Loop
     from cdhr_host.pipeline import Proof
+    from cdhr_host.profile import Profile
 
 EXAMPLES = examples(
     "cdhr stream gcode/paper_ring_double.gcode --speed 20",
     "cdhr stream vase.gcode.gz --profile paper-wide --log run.parquet",
+    "cdhr stream part.gcode --control outer --speed 20",
     "cdhr stream part.gcode --json",
     more="Ctrl-C stops on the path and closes the air (exit code 130).",
 )
+
+
+class Control(StrEnum):
+    """Loops that can be closed on the simulated machine."""
+
+    NONE = "none"
+    OUTER = "outer"
+    PPC = "ppc"
 
 
 def stream(
@@ -34,6 +46,10 @@ def stream(
         float,
         typer.Option(metavar="X", help="Run the simulated drives X times faster than real time.", min=0.01),
     ] = 1.0,
+    control: Annotated[
+        Control,
+        typer.Option(help="Close a loop on the simulated machine: outer on the nozzle, ppc on the forces."),
+    ] = Control.NONE,
     log: LogPath = None,
     json_: Json = False,
     yes: Annotated[
@@ -51,6 +67,7 @@ def stream(
     source = Source(file)
     machine = open_machine(profile)
     check_log(log)
+    loop = _loop(control, machine, drives)
     link, clock = opened(drives, machine, speed)
     try:
         with about(source.name):
@@ -60,7 +77,8 @@ def stream(
                 raise typer.Exit(MotionError.exit_code)
             _agreed(proof, drives, yes)
             with StopRequest() as stop:
-                summary = printed(Run(source, machine, proof, link, clock, stop, waits=not yes), log)
+                run = Run(source, machine, proof, link, clock, stop, waits=not yes, loop=loop)
+                summary = printed(run, log)
     finally:
         link.close()
     if json_:
@@ -69,6 +87,17 @@ def stream(
         emit("\n".join(run_lines(summary, proof, source.name)))
     if summary.interrupted:
         raise typer.Exit(INTERRUPTED)
+
+
+def _loop(control: Control, machine: "Profile", drives: str) -> "Loop | None":
+    """The control loop of the simulated machine; refused for drives that are not simulated."""
+    if control is Control.NONE:
+        return None
+    if drives != SIMULATED:
+        raise Refusal("cdhr: error: --control is for the simulated machine\nhint: leave out --drives")
+    from cdhr_host.job.closed_loop import simulated
+
+    return simulated(control.value, machine)
 
 
 def _agreed(proof: "Proof", drives: str, yes: bool) -> None:

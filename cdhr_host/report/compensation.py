@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdhr_host.mechanism import Cables, forward, lengths, uncompensated_error
+from cdhr_host.mechanism import Cables, forward, lengths, model_errors, uncompensated_error
 from cdhr_host.profile import Profile
 from cdhr_host.values import Array
 
@@ -25,3 +25,8 @@ def compensation(profile: Profile, position: Array) -> Compensation:
     nozzle, _ = uncompensated_error(cables, position, position)
     reached, _ = forward(cables, lengths(cables, position, position))
     return Compensation(np.abs(nozzle).max(axis=0), np.abs(reached - position).max(axis=0))
+
+
+def models(profile: Profile, position: Array) -> dict[tuple[str, str], Array]:
+    """(N, 3) m -> {(believed, actual): (3,) m}: setpoints by one pulley model on a machine like another."""
+    return model_errors(Cables.from_profile(profile), position, position)
