@@ -14,7 +14,7 @@ import numpy as np
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.motion.limits import Cells, MotionLimits, cells
 from cdhr_host.motion.look_ahead import border_speeds
-from cdhr_host.motion.smooth_path import STRAIGHT, SmoothPath, smooth
+from cdhr_host.motion.smooth_path import STRAIGHT, SmoothPath, reaches, smooth
 from cdhr_host.motion.time_law import TimeLaw, time_law
 from cdhr_host.units import MM
 from cdhr_host.values import Array, Flags, Ints
@@ -112,7 +112,10 @@ class LegPlanner:
         rounded = closes and _room(segments.points[::-1], h) < h
         path = smooth(segments.points, h, opens=self._opens, closes=rounded)
         self._planned = len(segments)
-        span = (self._first, path.end if closes else path.end - h)
+        known = (
+            path.end if closes else path.end - max(h, _lengths(np.diff(segments.points[-2:], axis=0))[0] / 2)
+        )
+        span = (self._first, float(known))
         if span[1] <= span[0]:
             return None
         found = cells(
@@ -139,9 +142,10 @@ class LegPlanner:
         segments = self._segments
         assert segments is not None
         border = float(found.start[count])
-        drawn = np.concatenate(([0.0], np.cumsum(_lengths(np.diff(segments.points, axis=0)))))
-        reach = border - self._limits.half_width
-        first = max(int(np.searchsorted(drawn, reach, side="right")) - 1, 0)
+        lengths = _lengths(np.diff(segments.points, axis=0))
+        drawn = np.concatenate(([0.0], np.cumsum(lengths)))
+        over = np.maximum.accumulate(drawn + reaches(lengths, self._limits.half_width))
+        first = max(int(np.searchsorted(over, border, side="right")) - 1, 0)
         self._segments = segments.part(first, len(segments))
         self._planned = len(self._segments)
         self._opens = self._opens and first == 0

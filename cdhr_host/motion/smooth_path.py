@@ -13,6 +13,10 @@ h: q(s) = integral K(u) p(s - u) du, K(u) = (h - |u|)/h². The result is a cubic
 Chords of a curve are smoothed together because the kernel spans them; a line stays a line.
 An exact stop is one more corner, from or to direction zero: there the curve starts or ends
 at rest in s itself (q' = q'' = 0), h before the first and h after the last point.
+
+A corner that stands alone gets a kernel of its own, wider the less it turns: no kernel but
+its own reaches where its segments' halves do, and there q leaves p by |turn| h/6 at most, so
+that h = 2 h0/|turn| makes use of the h0/3 that all are allowed.
 """
 
 from dataclasses import dataclass
@@ -77,9 +81,10 @@ def smooth(points: Array, h: float, *, opens: bool, closes: bool) -> SmoothPath:
     lengths = _norm(steps)
     drawn = np.concatenate(([0.0], np.cumsum(lengths)))
     direction = steps / lengths[:, None]
-    corner_s, turn = _corners(drawn, direction, opens=opens, closes=closes)
+    corner, turn = _corners(direction, opens=opens, closes=closes)
     last = drawn[-1] + h if closes else drawn[-1]
-    knots, third, bending = _knots(corner_s, turn, h, last, drawn)
+    width = _widths(lengths, corner, turn, h)
+    knots, third, bending = _knots(drawn[corner], turn, width, np.append(drawn[:-1], -h), last)
     widths = np.diff(knots, append=last)[:, None]
     segment = np.clip(np.searchsorted(drawn, knots, side="right") - 1, 0, len(lengths) - 1)
     straight = bending == 0
@@ -107,26 +112,40 @@ def _anchored(sums: Array, drawn: Array, straight: Flags) -> Array:
     return np.asarray(sums + shift, dtype=np.float64)
 
 
-def _corners(drawn: Array, direction: Array, *, opens: bool, closes: bool) -> tuple[Array, Array]:
-    """Where the direction changes, and by which vector."""
+def _corners(direction: Array, *, opens: bool, closes: bool) -> tuple[Ints, Array]:
+    """Points at which the direction changes, and by which vector."""
     rest = np.zeros((1, 3))
     around = np.concatenate((rest if opens else direction[:1], direction, rest if closes else direction[-1:]))
     bends = np.flatnonzero(_norm(np.diff(around, axis=0)) > STRAIGHT)
     # Each corner takes along the turns before it that were too small to be one.
     before = around[np.concatenate(([0], bends[:-1] + 1))] if len(bends) else around[:0]
-    return drawn[bends], around[bends + 1] - before
+    return bends, around[bends + 1] - before
 
 
-def _knots(corner: Array, turn: Array, h: float, last: float, drawn: Array) -> tuple[Array, Array, Ints]:
-    """Piece starts (K,), q''' on each (K, 3), and how many kernels reach into it (K,)."""
-    at = np.concatenate((corner - h, corner, corner + h, drawn[:-1], [-h]))
+def reaches(lengths: Array, h: float) -> Array:
+    """(M,) m -> (M+1,) m: how far the kernel of a corner at each point may reach along the path."""
+    half = np.concatenate(([0.0], lengths, [0.0])) / 2
+    return np.maximum(np.minimum(half[:-1], half[1:]), h)
+
+
+def _widths(lengths: Array, corner: Ints, turn: Array, h: float) -> Array:
+    """(K,) m: half-width of each corner's kernel."""
+    return np.maximum(np.minimum(reaches(lengths, h)[corner], 2 * h / _norm(turn)), h)
+
+
+def _knots(corner: Array, turn: Array, width: Array, also: Array, last: float) -> tuple[Array, Array, Ints]:
+    """Piece starts (K,), q''' on each (K, 3), and how many kernels reach into it (K,).
+
+    Pieces begin where a kernel does, at its middle and end, and ``also`` elsewhere.
+    """
+    at = np.concatenate((corner - width, corner, corner + width, also))
     jump = np.zeros((len(at), 3))
     count = np.zeros(len(at), dtype=np.int64)
-    n = len(corner)
-    jump[:n], jump[n : 2 * n], jump[2 * n : 3 * n] = turn / h**2, -2 * turn / h**2, turn / h**2
+    n, steep = len(corner), turn / width[:, None] ** 2
+    jump[:n], jump[n : 2 * n], jump[2 * n : 3 * n] = steep, -2 * steep, steep
     count[:n], count[2 * n : 3 * n] = 1, -1
     order = np.argsort(at, kind="stable")
-    at = np.clip(at[order], -h, last)
+    at = np.clip(at[order], also[-1], last)
     third, active = np.cumsum(jump[order], axis=0), np.cumsum(count[order])
     keep = np.diff(at, append=last) > 0
     third[active == 0] = 0.0

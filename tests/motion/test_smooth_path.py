@@ -86,3 +86,26 @@ def test_straight_points_make_no_corner():
     path = smooth(points, H, opens=False, closes=False)
     assert not path.bending.any()
     assert path.lengths().sum() == pytest.approx(0.1 + H)
+
+
+def test_a_corner_that_stands_alone_is_rounded_as_far_as_allowed():
+    for degrees in (5, 20, 60, 90, 140):
+        turn = math.radians(degrees)
+        points = np.array([[0, 0, 0], [0.1, 0, 0], [0.1 + 0.1 * math.cos(turn), 0.1 * math.sin(turn), 0]])
+        path = smooth(points, H, opens=False, closes=False)
+        _, position, _, _ = path.at(np.array([0.1]))
+        assert np.linalg.norm(position[0] - points[1]) == pytest.approx(H / 3, rel=1e-6)
+        largest, _ = path.bounds()
+        assert largest.max() == pytest.approx((2 * math.sin(turn / 2)) ** 2 / (2 * H), rel=1e-6)
+
+
+def test_wide_kernels_stay_within_the_halves_of_their_segments():
+    rng = np.random.default_rng(2)
+    points = np.cumsum(rng.normal(size=(200, 3)) * rng.choice([1e-4, 2e-3, 2e-2], size=(200, 1)), axis=0)
+    path = smooth(points, H, opens=True, closes=True)
+    places = np.linspace(-H, path.end, 100_000)
+    _, position, slope, _ = path.at(places)
+    drawn = np.concatenate(([0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))))
+    same = np.stack([np.interp(places, drawn, points[:, k]) for k in range(3)], axis=1)
+    assert np.linalg.norm(position - same, axis=1).max() <= H / 3 * (1 + 1e-9)
+    assert np.linalg.norm(slope, axis=1).max() <= 1 + 1e-9
