@@ -107,8 +107,9 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--hz", type=int, default=250)
+    parser.add_argument("--smoke", action="store_true", help="three seconds")
     arguments = parser.parse_args()
-    print(json.dumps(measure(arguments.seconds, arguments.hz)))
+    print(json.dumps(measure(3.0 if arguments.smoke else arguments.seconds, arguments.hz)))
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 OPENBLAS_NUM_THREADS=1 python benchmarks/mechanism.py [POSES]
 """
 
-import sys
+import argparse
 import time
 from collections.abc import Callable
 
@@ -46,7 +46,11 @@ def report(what: str, count: int, seconds: float) -> None:
 
 
 def main() -> None:
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else POSES
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--poses", type=int, default=POSES)
+    parser.add_argument("--smoke", action="store_true", help="few poses")
+    options = parser.parse_args()
+    count = 20_000 if options.smoke else options.poses
     profile = open_profile("paper-wide")
     cables, loads, pairs = (
         Cables.from_profile(profile),

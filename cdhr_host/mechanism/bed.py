@@ -41,7 +41,8 @@ def bed_findings(profile: Profile, cables: Cables, *, sound: bool) -> Iterator[F
         yield from slack
         if not slack and profile.sliders.travel_min < profile.sliders.travel_max:
             policy = Policy.from_profile(profile, None if sound else "fixed")
-            yield from _travel(profile, cables, policy, within)
+            lost = [*_lost(profile, cables, policy, within)]
+            yield from lost or _travel(profile, cables, policy, within)
 
 
 def _planes(profile: Profile, room: float) -> Iterator[Finding]:
@@ -90,6 +91,27 @@ def _slack(profile: Profile, cables: Cables, height: float) -> Iterator[Finding]
         value=bed.radius / MM,
         limit=radius / MM,
         hint=_advice(radius, "bed.radius_mm", "move bed.origin_x_mm and bed.origin_y_mm towards the axis"),
+    )
+
+
+def _lost(profile: Profile, cables: Cables, policy: Policy, height: float) -> Iterator[Finding]:
+    """Whether the policy takes the upper platform out of the pulleys' reach."""
+
+    def fits(rise: float) -> bool:
+        q = _displacements(cables, profile.bed.radius, rise)
+        return bool(reachable(cables, q, policy.upper(q)).all())
+
+    if fits(height):
+        return
+    rise = _largest(height, fits)
+    yield finding(
+        GEOMETRY | BED | {"spring.policy"},
+        "bed.height_mm",
+        f"= {profile.bed.height / MM:.6g} lets the policy {profile.spring.policy} "
+        "take the upper platform out of its cables' reach",
+        value=profile.bed.height / MM,
+        limit=rise / MM,
+        hint=_advice(rise, "bed.height_mm", "take another spring.policy"),
     )
 
 

@@ -16,6 +16,7 @@ NAMES = ["paper", "paper-simulation", "paper-wide"]
 def changed(name: str = "paper-wide", **values: float) -> Profile:
     """A shipped profile with ``section__key`` values replaced."""
     table: dict[str, Any] = read_table(find(name))
+    table["spring"]["policy"] = "fixed"
     for place, value in values.items():
         section, key = place.split("__")
         assert key in table[section]
@@ -133,6 +134,15 @@ def test_a_bed_through_the_upper_pulleys() -> None:
     assert "below 1302.5" in str(found["bed.height_mm"].hint)
     travel = {"sliders__travel_min_mm": -2000.0, "sliders__travel_max_mm": 2000.0}
     assert problems(bed__height_mm=1302.4, **travel) == {}
+
+
+def test_a_bed_so_high_that_the_policy_leaves_the_pulleys() -> None:
+    table = read_table(find("paper-wide"))
+    table["bed"]["height_mm"] = 1295.0
+    found = [problem for _, problem in inconsistencies(validate(table)[0])]
+    assert [problem.key for problem in found] == ["bed.height_mm"]
+    assert "policy free" in found[0].message
+    assert 800.0 < float(found[0].limit or 0.0) < 1295.0
 
 
 def test_a_bed_above_the_upper_pulleys() -> None:
