@@ -13,8 +13,9 @@ Point2 = tuple[float, float]
 GRID_DIGITS: Final = 12
 """Positions are kept on a grid of one picometre, so that the rounding left by G91 and G92
 cannot become a move."""
-CLAY_LEAST: Final = 1e-7 * MM3
-"""m³; a step of E below this is the rounding of the file's decimals, not clay."""
+CLAY_LEAST: Final = 1e-3 * MM3
+"""m³; a step of E below this is the rounding of the file's four or five decimals, not clay: a
+travel must not open the air for it. A 5 mm bead has as much in a tenth of a micrometre."""
 
 
 @dataclass(frozen=True, slots=True)

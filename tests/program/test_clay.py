@@ -148,3 +148,10 @@ def test_air_level_range(line: str) -> None:
 
 def test_pin_needs_both_words() -> None:
     assert "M42 needs S" in only_problem("M42 P4\n").message
+
+
+def test_rounding_of_e_on_a_travel_is_not_clay() -> None:
+    """Absolute E written once with four decimals and once with six, as FullControl does."""
+    commands = read("G92 E0\nG1 F120 E39.7473\nG1 F250 Z100 E39.747332\nG1 F1200 X5 E40\n")
+    assert column(commands, "clay", 1e-9)[0] == 0
+    assert column(commands, "clay", 1e-9)[1] == pytest.approx(0.252668, abs=1e-3)
