@@ -73,5 +73,5 @@ def by_toppra(run: Run, acceleration: float) -> float:
 
 
 def test_toppra_finds_the_same(setting):
-    (run,) = runs_of(setting, "zigzag 20°, F60")
+    (run,) = runs_of(setting, "square 20 mm, F60")  # along the axes toppra's box of speeds is the ball
     assert bound(run, setting[1]) == pytest.approx(by_toppra(run, setting[1].acceleration), rel=0.01)
