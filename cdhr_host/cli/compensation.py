@@ -12,12 +12,18 @@ from cdhr_host.cli.refusals import about, emit
 from cdhr_host.units import MM
 
 if TYPE_CHECKING:
+    from cdhr_host.profile import Profile
+    from cdhr_host.report.compensation import StretchEffect
     from cdhr_host.values import Array
+
+STRIDE = 10
+"""samples of a trajectory from one look at the stretch to the next"""
 
 EXAMPLES = examples(
     "cdhr compensation",
     "cdhr compensation --trajectory 36 --profile paper",
     "cdhr compensation --models",
+    "cdhr compensation --stretch --profile paper",
     "cdhr compensation --json",
 )
 
@@ -43,11 +49,15 @@ def compensation(
     models: Annotated[
         bool, typer.Option("--models", help="Setpoints by each pulley model on a machine like each other.")
     ] = False,
+    stretch: Annotated[
+        bool, typer.Option("--stretch", help="What elastic cables do, and what is not known of them.")
+    ] = False,
     json_: Json = False,
 ) -> None:
     """The nozzle's greatest error along a trajectory of the paper, with and without compensated pulleys."""
     from cdhr_host.report.compensation import compensation as compare
     from cdhr_host.report.compensation import models as compare_models
+    from cdhr_host.report.compensation import stretch_effect
     from cdhr_host.samples import LAWS
 
     law = LAWS[trajectory.value]
@@ -56,6 +66,9 @@ def compensation(
         machine, position = open_machine(profile), law.position(law.times(step)[:-1])
         if models:
             emit(_models(drawn, compare_models(machine, position), json_))
+            return
+        if stretch:
+            emit(_stretch(drawn, machine, stretch_effect(machine, position[::STRIDE]), json_))
             return
         found = compare(machine, position)
     if json_:
@@ -74,6 +87,20 @@ def compensation(
         f"greatest nozzle error, mm          x            y            z\n"
         f"setpoints |BA| (straight cable)    {_row(found.uncompensated, '.5f')}\n"
         f"setpoints round the pulleys        {_row(found.compensated, '.2e')}"
+    )
+
+
+def _stretch(drawn: str, machine: "Profile", found: "StretchEffect", json_: bool) -> str:
+    soft = machine.stretch
+    if json_:
+        record = {"ignored_mm": (found.ignored / MM).tolist(), "doubt_mm": (found.doubt / MM).tolist()}
+        return json.dumps({"stiffness_n": soft.stiffness, "stiffness_doubt": soft.stiffness_doubt, **record})
+    return (
+        f"{drawn}\n"
+        f"cables of EA = {soft.stiffness:g} N, known to {100 * soft.stiffness_doubt:g} %\n"
+        f"greatest nozzle error, mm          x            y            z\n"
+        f"stretch not allowed for            {_row(found.ignored, '.5f')}\n"
+        f"allowed for, EA as far off         {_row(found.doubt, '.5f')}"
     )
 
 

@@ -12,7 +12,8 @@ outside the funnel for ``patience`` samples in a row stops the machine on its pa
 silent for ``timeout`` leaves the shift where it is, and says so.
 
 The upper platform is shifted with the lower one, and further up or down so that the force
-sensors of cables 4-6 show the planned vertical pull: 1 N for each mm against the spring.
+sensors of cables 4-6 show the planned vertical pull: 1 N for each mm against the spring. Both
+corrections are rate-limited, and one that would leave its range stops the machine.
 """
 
 import math
@@ -145,8 +146,8 @@ class Outer:
         short = equations.tension(plan.acceleration)[3:] - seen.tension[3:]
         missing = float(equations.pull[5, 3:] @ short) / self._stiffness
         move = max(-g.rate, min(g.rate, g.tension_gain * missing))
-        rise = max(-g.tension_range, min(g.tension_range, state.rise + dt * move))
-        return replace(state, rise=rise)
+        rise = state.rise + dt * move
+        return replace(state, mode=Mode.STOP) if abs(rise) > g.tension_range else replace(state, rise=rise)
 
     def _notice(self, state: OuterState, t: float) -> str:
         if state.mode is Mode.CLOSED:
@@ -156,7 +157,10 @@ class Outer:
         radius = self.settings.funnel.radius(t - (state.began or 0.0))
         if state.outside:
             return f"stop at {t:.3f} s: the nozzle is more than {radius / MM:.3f} mm away from the path"
-        return f"stop at {t:.3f} s: the correction would exceed {self.settings.range / MM:.3f} mm"
+        return (
+            f"stop at {t:.3f} s: the correction would exceed {self.settings.range / MM:g} mm for the nozzle "
+            f"or {self.settings.tension_range / MM:g} mm for the force"
+        )
 
 
 def _planned(past: tuple[tuple[float, Array], ...], t: float) -> Array:

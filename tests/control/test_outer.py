@@ -95,7 +95,7 @@ def test_a_correction_beyond_its_range_stops() -> None:
     machine = Rehearsal(OuterSettings(range=2e-4))
     machine.run(4.0, OFFSET)
     assert machine.mode is Mode.STOP
-    assert "would exceed 0.200 mm" in machine.notices[-1]
+    assert "would exceed 0.2 mm for the nozzle" in machine.notices[-1]
 
 
 def test_a_silent_source_opens_the_loop_and_says_so() -> None:
