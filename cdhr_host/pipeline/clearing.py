@@ -9,6 +9,10 @@ from cdhr_host.profile import Profile
 from cdhr_host.values import Setpoints
 
 
+STEP = 250
+"""rows laid before they are looked at: half a metre, little beside a layer of a part that could be hit"""
+
+
 class Clearing:
     """Fed with setpoints in the order of the program.
 
@@ -25,7 +29,10 @@ class Clearing:
         if self.warning is not None or not len(setpoints):
             return []
         rows = _spaced(setpoints)
-        found = self._clearance.block(rows.nozzle_G, rows.line, rows.flow > 0.0)
+        found: list[Problem] = []
+        for first in range(0, len(rows), STEP):
+            part = rows[first : first + STEP]
+            found += self._clearance.block(part.nozzle_G, part.line, part.flow > 0.0)
         if self._refuses or not found:
             return found
         self.warning = found[0]

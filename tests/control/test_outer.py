@@ -153,3 +153,17 @@ def test_encoders_are_a_pose_source() -> None:
     assert sample.frame == 5
     assert sample.t == pytest.approx(0.02)
     assert np.abs(sample.position - q[0]).max() < 1e-12
+
+
+def test_a_force_correction_beyond_its_range_stops() -> None:
+    outer, state = Outer(PAPER, OuterSettings(tension_range=2e-4)), Outer(PAPER).start()
+    nothing, mode = np.zeros(6), Mode.OPEN
+    for n in range(4000):
+        plan = Plan(n * DT, nothing, nothing, nothing)
+        state, action = outer.step(state, plan, Seen(nothing, nothing, np.zeros(6)), DT)
+        if action.mode is Mode.STOP:
+            mode = action.mode
+            break
+    assert mode is Mode.STOP
+    assert "for the force" in action.notice
+    assert abs(float(action.shift[5])) <= 2e-4
