@@ -14,7 +14,7 @@ import numpy as np
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.motion.limits import Cells, MotionLimits, cells
 from cdhr_host.motion.look_ahead import border_speeds
-from cdhr_host.motion.smooth_path import STRAIGHT, SmoothPath, reaches, smooth
+from cdhr_host.motion.smooth_path import STRAIGHT, SmoothPath, norms, reaches, smooth
 from cdhr_host.motion.time_law import TimeLaw, time_law
 from cdhr_host.units import MM
 from cdhr_host.values import Array, Flags, Ints
@@ -112,9 +112,7 @@ class LegPlanner:
         rounded = closes and _room(segments.points[::-1], h) < h
         path = smooth(segments.points, h, opens=self._opens, closes=rounded)
         self._planned = len(segments)
-        known = (
-            path.end if closes else path.end - max(h, _lengths(np.diff(segments.points[-2:], axis=0))[0] / 2)
-        )
+        known = path.end if closes else path.end - max(h, norms(np.diff(segments.points[-2:], axis=0))[0] / 2)
         span = (self._first, float(known))
         if span[1] <= span[0]:
             return None
@@ -142,7 +140,7 @@ class LegPlanner:
         segments = self._segments
         assert segments is not None
         border = float(found.start[count])
-        lengths = _lengths(np.diff(segments.points, axis=0))
+        lengths = norms(np.diff(segments.points, axis=0))
         drawn = np.concatenate(([0.0], np.cumsum(lengths)))
         over = np.maximum.accumulate(drawn + reaches(lengths, self._limits.half_width))
         first = max(int(np.searchsorted(over, border, side="right")) - 1, 0)
@@ -169,18 +167,12 @@ class LegPlanner:
 
 def _room(points: Array, enough: float) -> float:
     """(M+1, 3) m -> m from the first point to the first corner, infinite if there is none."""
-    near = int(np.searchsorted(np.cumsum(_lengths(np.diff(points, axis=0))), enough)) + 2
+    near = int(np.searchsorted(np.cumsum(norms(np.diff(points, axis=0))), enough)) + 2
     steps = np.diff(points[: near + 1], axis=0)
-    lengths = _lengths(steps)
+    lengths = norms(steps)
     direction = steps / lengths[:, None]
-    corners = np.flatnonzero(_lengths(np.diff(direction, axis=0)) > STRAIGHT)
+    corners = np.flatnonzero(norms(np.diff(direction, axis=0)) > STRAIGHT)
     return float(lengths[: corners[0] + 1].sum()) if len(corners) else math.inf
-
-
-def _lengths(steps: Array) -> Array:
-    """(M, 3) -> (M,)."""
-    found: Array = np.sqrt(np.einsum("nk,nk->n", steps, steps))
-    return found
 
 
 def _settled(found: Cells, final: Flags) -> int:

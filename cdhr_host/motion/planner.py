@@ -12,6 +12,7 @@ from cdhr_host.motion.curves import points_on
 from cdhr_host.motion.leg import BATCH, LegPlanner, Segments
 from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.sampling import Stand, Stretch, Timeline
+from cdhr_host.motion.smooth_path import norms
 from cdhr_host.values import (
     Arc,
     Array,
@@ -75,7 +76,7 @@ class Planner:
     def _(self, command: Moves) -> Iterator[Stretch]:
         points = np.concatenate((command.start_G[None], command.end_G))
         steps = np.diff(points, axis=0)
-        length = np.sqrt(np.einsum("nk,nk->n", steps, steps))
+        length = norms(steps)
         keep = length > 0.0
         if not keep.any():
             return iter(())
@@ -127,7 +128,7 @@ class Planner:
     def _curve(self, command: Arc | Spline, points: Array) -> Iterator[Stretch]:
         """Draw a curve through (M + 1, 3) m; clay is even along it."""
         steps = np.diff(points, axis=0)
-        length = np.sqrt(np.einsum("nk,nk->n", steps, steps))
+        length = norms(steps)
         points = np.concatenate((points[:1], points[1:][length > 0.0]))
         count, whole = len(points) - 1, float(length.sum())
         for first in range(0, count, BATCH):
@@ -145,7 +146,7 @@ class Planner:
         """Add segments to the leg; close it before those in ``stops`` (M,) and before sharp corners."""
         drawn = replace(drawn, feed=np.minimum(drawn.feed, self._limits.speed))
         steps = np.diff(drawn.points, axis=0)
-        direction = steps / np.sqrt(np.einsum("nk,nk->n", steps, steps))[:, None]
+        direction = steps / norms(steps)[:, None]
         stops = stops | self._sharp(direction)
         first = 0
         for corner in [*np.flatnonzero(stops).tolist(), len(drawn)]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from cdhr_host.motion.leg import Leg
 from cdhr_host.motion.shaping import UNSHAPED, Shaper
+from cdhr_host.motion.smooth_path import norms
 from cdhr_host.values import Array, Ints, ToolTrack
 
 BLOCK = 4096
@@ -149,7 +150,7 @@ def _moving(leg: Leg, tick: Ints, t: Array) -> ToolTrack:
     velocity = slope * rate[:, None]
     acceleration = bend * (rate**2)[:, None] + slope * change[:, None]
     segment = leg.path.segment[piece]
-    speed = np.sqrt(np.einsum("nk,nk->n", velocity, velocity))
+    speed = norms(velocity)
     carried = leg.segments
     air = np.where(speed > 0.0, carried.air[segment], 0.0)
     flow = carried.clay[segment] * speed

@@ -52,9 +52,9 @@ class SmoothPath:
         """((K,), (K,)): greatest |q''| (1/m) and |q'''| (1/m²) within each piece."""
         _, _, second, third = self.coefficients
         after = second + third * self.lengths()
-        largest = np.maximum(_norm(second.T), _norm(after.T))
+        largest = np.maximum(norms(second.T), norms(after.T))
         bent = self.bending > 0
-        return np.where(bent, largest, 0.0), np.where(bent, _norm(third.T), 0.0)
+        return np.where(bent, largest, 0.0), np.where(bent, norms(third.T), 0.0)
 
     def at(self, s: Array) -> tuple[Ints, Array, Array, Array]:
         """(N,) -> piece (N,), q, q', q'' (N, 3) each."""
@@ -78,7 +78,7 @@ def smooth(points: Array, h: float, *, opens: bool, closes: bool) -> SmoothPath:
     after it where the polyline closes.
     """
     steps = np.diff(points, axis=0)
-    lengths = _norm(steps)
+    lengths = norms(steps)
     drawn = np.concatenate(([0.0], np.cumsum(lengths)))
     direction = steps / lengths[:, None]
     corner, turn = _corners(direction, opens=opens, closes=closes)
@@ -116,7 +116,7 @@ def _corners(direction: Array, *, opens: bool, closes: bool) -> tuple[Ints, Arra
     """Points at which the direction changes, and by which vector."""
     rest = np.zeros((1, 3))
     around = np.concatenate((rest if opens else direction[:1], direction, rest if closes else direction[-1:]))
-    bends = np.flatnonzero(_norm(np.diff(around, axis=0)) > STRAIGHT)
+    bends = np.flatnonzero(norms(np.diff(around, axis=0)) > STRAIGHT)
     # Each corner takes along the turns before it that were too small to be one.
     before = around[np.concatenate(([0], bends[:-1] + 1))] if len(bends) else around[:0]
     return bends, around[bends + 1] - before
@@ -130,7 +130,7 @@ def reaches(lengths: Array, h: float) -> Array:
 
 def _widths(lengths: Array, corner: Ints, turn: Array, h: float) -> Array:
     """(K,) m: half-width of each corner's kernel."""
-    return np.maximum(np.minimum(reaches(lengths, h)[corner], 2 * h / _norm(turn)), h)
+    return np.maximum(np.minimum(reaches(lengths, h)[corner], 2 * h / norms(turn)), h)
 
 
 def _knots(corner: Array, turn: Array, width: Array, also: Array, last: float) -> tuple[Array, Array, Ints]:
@@ -157,7 +157,7 @@ def _before(increments: Array) -> Array:
     return np.concatenate((np.zeros((1, increments.shape[1])), np.cumsum(increments, axis=0)[:-1]))
 
 
-def _norm(vectors: Array) -> Array:
-    """(N, 3) -> (N,)."""
+def norms(vectors: Array) -> Array:
+    """(N, 3) -> (N,): lengths of vectors."""
     lengths: Array = np.sqrt(np.einsum("nk,nk->n", vectors, vectors))
     return lengths

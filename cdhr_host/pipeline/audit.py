@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdhr_host.errors import Problem
+from cdhr_host.motion.smooth_path import norms
 from cdhr_host.profile import Profile
 from cdhr_host.units import KPA, MM
 from cdhr_host.values import Array, CableState, Flags, Ints, Setpoints, ToolTrack
@@ -157,7 +158,7 @@ class Audit:
         """What of a block breaks a limit of cables, sliders, nozzle or air; ``nine`` (N, 9) N."""
         forces = self._profile.forces
         line, limits, sliders = track.line, self._profile.limits, self._profile.sliders
-        speed, acceleration = _norm(track.velocity)[:, None], _norm(track.acceleration)[:, None]
+        speed, acceleration = norms(track.velocity)[:, None], norms(track.acceleration)[:, None]
         pressure, supply = setpoints.pressure[:, None], self._profile.extruder.pressure_max
         found = [
             *self._broken(SLACK, line, state.tension, self._least),
@@ -208,8 +209,3 @@ def _problem(rule: _Rule, line: int, i: int, value: float, limit: float) -> Prob
 
 def _by_line(problem: Problem) -> int:
     return problem.line or 0
-
-
-def _norm(vectors: Array) -> Array:
-    lengths: Array = np.sqrt(np.einsum("nk,nk->n", vectors, vectors))
-    return lengths

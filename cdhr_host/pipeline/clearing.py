@@ -8,7 +8,6 @@ from cdhr_host.pipeline.survey import SPACING
 from cdhr_host.profile import Profile
 from cdhr_host.values import Setpoints
 
-
 STEP = 250
 """rows laid before they are looked at: half a metre, little beside a layer of a part that could be hit"""
 

@@ -10,6 +10,7 @@ from cdhr_host.errors import MAX_LISTED, Problem
 from cdhr_host.motion.arc import arc_length
 from cdhr_host.motion.curves import spline_length
 from cdhr_host.motion.sampling import Timed
+from cdhr_host.motion.smooth_path import norms
 from cdhr_host.pipeline.clearing import Clearing
 from cdhr_host.pipeline.columns import setpoint_columns
 from cdhr_host.pipeline.shift import Shift
@@ -165,7 +166,7 @@ class _Tally:
     def _(self, command: Moves) -> None:
         steps = np.diff(np.concatenate((command.start_G[None], command.end_G)), axis=0)
         self.moves += len(command.line)
-        self.path += float(np.sqrt(np.einsum("nk,nk->n", steps, steps)).sum())
+        self.path += float(norms(steps).sum())
         self.extruded += float(command.clay.sum())
 
     @command.register
