@@ -11,10 +11,9 @@ from cdhr_host.cli.refusals import problem_lines, say, writing
 from cdhr_host.cli.source import Source
 
 if TYPE_CHECKING:
-    from cdhr_host.pipeline import Proof
+    from cdhr_host.pipeline import Checked, Proof
     from cdhr_host.profile import Profile
     from cdhr_host.report.log import Log
-    from cdhr_host.values import Setpoints
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +35,8 @@ def proven(
 
     with _log(log, machine, rate) as (out, takes), Progress("checking") as progress:
 
-        def watch(block: "Setpoints") -> None:
-            if len(block):
+        def watch(checked: "Checked") -> None:
+            if len(block := checked.setpoints):
                 progress.show(source.fraction, f"line {block.line[-1]}  {clock_text(block.t[-1])} of motion")
 
         proof = prove(source.chunks(), machine, rate_hz=rate, watch=watch, **takes)

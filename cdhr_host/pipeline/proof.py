@@ -72,14 +72,14 @@ def prove(
     rate_hz: float | None = None,
     sink: Callable[[Setpoints], None] | None = None,
     trace: Callable[[Trace], None] | None = None,
-    watch: Callable[[Setpoints], None] | None = None,
+    watch: Callable[[Checked], None] | None = None,
 ) -> Proof:
     """Walk a program's text once, in memory that does not grow with it.
 
     ``sink`` gets every setpoint, in blocks, as long as there is no problem. Without it only
     the setpoints are computed that prove the others (see ``survey``); the extremes are then
     theirs. ``trace`` gets every tick without its forces. ``watch`` gets the blocks that are
-    computed, to show progress. Raises ProgramError for text that is not understood; what the
+    computed, to show progress or draw. Raises ProgramError for text that is not understood; what the
     machine cannot do is listed in the proof instead.
     """
     staircase = Staircase(profile, rate_hz=rate_hz)
@@ -95,7 +95,7 @@ def prove(
             if sink is not None and not (staircase.problems or tally.collided):
                 sink(checked.setpoints)
             if watch is not None:
-                watch(checked.setpoints)
+                watch(checked)
         if trace is not None and not (staircase.problems or tally.collided):
             for traced in tracer.traces(step):
                 trace(traced)

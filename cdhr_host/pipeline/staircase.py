@@ -27,6 +27,10 @@ class Checked:
     setpoints: Setpoints
     problems: tuple[Problem, ...]
     """what the machine cannot do of it, one for each line, limit and cable"""
+    track: ToolTrack
+    """the nozzle at every sample of the block, those off the bed too"""
+    nine: Array
+    """(N, 9) N at each setpoint: left and right cables of the pairs, then the upper ones"""
 
 
 class Staircase:
@@ -124,11 +128,9 @@ class Staircase:
     def checked(self, track: ToolTrack) -> Checked:
         """Samples of the nozzle -> setpoints of the machine, audited."""
         inside = on_bed(track.position_G, self.profile)
-        problems = self._audit.places(track)
-        if not inside.all():
-            track = track[inside]
-        q, upper = self.rig.follow(track)
-        return self._audited(track, q, upper, problems)
+        problems, kept = self._audit.places(track), track if inside.all() else track[inside]
+        q, upper = self.rig.follow(kept)
+        return replace(self._audited(kept, q, upper, problems), track=track)
 
     def shifted(self, step: Shift) -> Checked:
         """As ``checked``, for the upper platform moving alone."""
@@ -151,7 +153,7 @@ class Staircase:
         )
         nine = self.rig.nine(q, track, upper)
         problems += self._audit.motion(track, state, nine, setpoints)
-        return Checked(setpoints, tuple(problems))
+        return Checked(setpoints, tuple(problems), track, nine)
 
     def _wanted(self) -> Array:
         """(3,) m: the offset the policy wants where the nozzle stands."""
