@@ -133,7 +133,7 @@ _TABLE: Final = (
 
 WORDS: Final[dict[str, KnownWord]] = {row.code: row for row in _TABLE}
 
-_REASONS: Final = {
+REASONS: Final = {
     "G5.2": "of the curves only G5 and G5.1 are there: write NURBS as cubics (G5)",
     "G5.3": "of the curves only G5 and G5.1 are there: write NURBS as cubics (G5)",
     "G41": "there is no cutter to compensate: let the slicer offset the path",
@@ -144,16 +144,17 @@ _REASONS: Final = {
     "M4": "the air has one direction: use M3",
     "M6": "there is one nozzle and no tool to change",
 }
+"""why some words are not there, and what to write instead"""
 
 
 def unknown(code: str, line: int, column: int) -> Problem:
     """The problem of a word that is not in the table, with the nearest that is."""
-    hint = _REASONS.get(code)
+    hint = REASONS.get(code)
     if hint is None and code[0] == "T":
         hint = "this machine has one nozzle: only T0"
     if hint is None:
         hint = f"did you mean {nearest(code)}?"
-    kind = "unknown" if code not in _REASONS else "unsupported"
+    kind = "unknown" if code not in REASONS else "unsupported"
     return Problem("word", f"{kind} word {code}", line, column, value=code, hint=hint)
 
 
