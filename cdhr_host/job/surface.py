@@ -147,6 +147,29 @@ class Reply:
     problems: tuple[Problem, ...] = ()
 
 
+class LineFeed(Protocol):
+    """A client's lines, printed as they come: one look-ahead over all that is there.
+
+    No whole file is proven here. Each line is checked before any of it moves: words, places and
+    forces at rest. One that is refused is told as a ``"problem"`` event with its number; what was
+    taken before it is executed to its end, at rest, and the state becomes HELD. When lines run
+    out, the machine comes to rest at the end of the last one and stays PRINTING.
+    """
+
+    def offer(self, line: str) -> bool:
+        """Take one line of G-code, without its end; False, and not taken, while there is no room."""
+        ...
+
+    @property
+    def pending(self) -> int:
+        """Lines taken whose motion has not ended; 0 says the machine stands after the last of them."""
+        ...
+
+    def finish(self) -> None:
+        """No more lines: all that were taken are executed, then DONE. Harmless when over."""
+        ...
+
+
 class Surface(Protocol):
     """What a ``Printer`` offers. A word that the present state does not allow raises JobError."""
 
@@ -173,6 +196,10 @@ class Surface(Protocol):
 
     def start(self, *, at_line: int | None = None) -> None:
         """READY -> PRINTING."""
+        ...
+
+    def open_stream(self, name: str) -> LineFeed:
+        """IDLE, READY, DONE, STOPPED -> PRINTING: lines instead of a file; one at a time."""
         ...
 
     def hold(self, reason: str = "") -> None:
