@@ -1,5 +1,14 @@
 """Flow -> air: the pressure that pushes the planned flow of clay."""
 
 from cdhr_host.extrusion.pressure import AirCommand, air_command
+from cdhr_host.extrusion.rheology import Channel, ChannelFlow, LinearFlow, Material, PressureFlow
 
-__all__ = ["AirCommand", "air_command"]
+__all__ = [
+    "AirCommand",
+    "Channel",
+    "ChannelFlow",
+    "LinearFlow",
+    "Material",
+    "PressureFlow",
+    "air_command",
+]
