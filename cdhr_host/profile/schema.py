@@ -20,6 +20,7 @@ from cdhr_host.profile.fields import (
     key,
     to_si,
 )
+from cdhr_host.profile.serving import Serve
 
 
 class Limits(Section):
@@ -260,3 +261,4 @@ class Profile(Section):
     drives: Drives
     canopen: CanOpen
     link: Link
+    serve: Serve
