@@ -56,6 +56,8 @@ class Proof:
     """of each log column, in the log's unit"""
     layers: tuple[tuple[int, int], ...]
     """(line, layer) where each layer begins"""
+    layer_times: tuple[float, ...]
+    """s at which each layer begins, as exactly as the ticks looked at tell"""
     pauses: int
     warnings: tuple[Problem, ...]
 
@@ -123,6 +125,7 @@ class _Tally:
     collided: int = 0
     problems: dict[tuple[int | None, str | None], Problem] = field(default_factory=dict)
     layers: list[tuple[int, int]] = field(default_factory=list)
+    layer_times: list[float] = field(default_factory=list)
     warnings: list[Problem] = field(default_factory=list)
     extremes: dict[str, Extreme] = field(default_factory=dict)
 
@@ -134,12 +137,19 @@ class _Tally:
         if not len(rows):
             return
         self.duration = float(rows.t[-1])
+        self._layers(rows)
         for name, values in setpoint_columns(rows).items():
             if name not in {"t_s", "line"}:
                 low, high = int(np.argmin(values)), int(np.argmax(values))
                 self._widen(
                     name, (float(values[low]), int(rows.line[low]), float(values[high]), int(rows.line[high]))
                 )
+
+    def _layers(self, rows: Setpoints) -> None:
+        for line, _ in self.layers[len(self.layer_times) :]:
+            if rows.line[-1] < line:
+                return
+            self.layer_times.append(float(rows.t[np.searchsorted(rows.line, line)]))
 
     def collisions(self, found: list[Problem]) -> None:
         """Take in collisions of cables."""
@@ -213,6 +223,7 @@ class _Tally:
             total_problems=staircase.problems + self.collided,
             extremes=self.extremes,
             layers=tuple(self.layers),
+            layer_times=(*self.layer_times, *[self.duration] * (len(self.layers) - len(self.layer_times))),
             pauses=self.pauses,
             warnings=(*self.warnings, *([collision] if collision else [])),
         )

@@ -156,6 +156,26 @@ def test_proof_counts_what_was_drawn(paper):
     assert set(proof.extremes) == set(SETPOINT_COLUMNS) - {"t_s", "line"}
 
 
+def test_layers_begin_with_the_first_tick_of_their_lines(paper):
+    text = b"M83\n;LAYER:0\nG1 X30 F1200 E60\n;LAYER:1\nG1 Y40 E80\n;LAYER:2\nM117 done\n"
+    blocks = []
+    proof = prove([text], paper, sink=lambda rows: blocks.append((rows.t, rows.line)))
+    t, line = (np.concatenate(part) for part in zip(*blocks, strict=True))
+    assert proof.layer_times == (t[line >= 2][0], t[line >= 4][0], proof.duration)
+    surveyed = prove([text], paper)
+    assert surveyed.layer_times == pytest.approx(proof.layer_times, abs=2e-3 / 0.02 + 0.004)
+
+
+def test_what_is_watched_says_where_and_how_hard(paper):
+    blocks = []
+    prove([b"G1 X30 F1200\nG1 X400\n"], paper, watch=blocks.append)
+    for block in blocks:
+        assert block.nine.shape == (len(block.setpoints), 9)
+        assert np.isin(block.setpoints.tick, block.track.tick).all()
+        assert np.allclose(block.nine[:, :3] + block.nine[:, 3:6], block.setpoints.tension[:, :3])
+    assert max(block.track.position_G[:, 0].max() for block in blocks) == pytest.approx(0.4)
+
+
 def test_extremes_are_those_of_all_rows(paper):
     collected = []
     proof = prove([SQUARE], paper, sink=lambda rows: collected.append(setpoint_columns(rows)))
