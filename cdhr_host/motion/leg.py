@@ -6,6 +6,7 @@ with what follows. So memory stays bounded however long a leg is, and the result
 depend on when segments arrived.
 """
 
+import copy
 import math
 from dataclasses import dataclass
 
@@ -26,6 +27,19 @@ MORE_ROOM = 0.5
 
 
 @dataclass(frozen=True, slots=True)
+class FeedOverride:
+    """A program run faster than it is written."""
+
+    factor: float = 1.0
+    """of every programmed speed, at least 1; slower is played, not planned (``motion.playback``)"""
+    flow_max: float = math.inf
+    """m³/s, what the air can push: no faster than that where clay is laid"""
+
+
+AS_PROGRAMMED = FeedOverride()
+
+
+@dataclass(frozen=True, slots=True)
 class Segments:
     """M drawn segments in a row, of positive length."""
 
@@ -42,6 +56,14 @@ class Segments:
 
     def __len__(self) -> int:
         return len(self.line)
+
+    def wanted(self, override: "FeedOverride") -> Array:
+        """(M,) m/s: the programmed speed, faster where the operator wants it and the air can follow."""
+        if override.factor == 1.0:
+            return self.feed
+        with np.errstate(divide="ignore"):
+            pushed = np.where(self.clay > 0.0, override.flow_max / self.clay, np.inf)
+        return np.minimum(self.feed * override.factor, np.maximum(pushed, self.feed))
 
     def part(self, first: int, last: int) -> "Segments":
         """Segments first to last - 1."""
@@ -71,6 +93,10 @@ class Leg:
     path: SmoothPath
     law: TimeLaw
     segments: Segments
+    number: int = 0
+    """of the drawn leg, which may be committed in several stretches"""
+    passed: float = 0.0
+    """m of the drawn leg that lie before s = 0"""
 
     @property
     def duration(self) -> float:
@@ -81,8 +107,12 @@ class Leg:
 class LegPlanner:
     """Collects the segments of one leg and commits what is settled."""
 
-    def __init__(self, limits: MotionLimits) -> None:
+    def __init__(
+        self, limits: MotionLimits, number: int = 0, override: FeedOverride = AS_PROGRAMMED
+    ) -> None:
         self._limits = limits
+        self._number = number
+        self._override = override
         self._segments: Segments | None = None
         self._planned = 0
         self._started = False
@@ -95,6 +125,12 @@ class LegPlanner:
     def add(self, segments: Segments) -> None:
         """Draw on; the segments begin where the last ones ended."""
         self._segments = segments if self._segments is None else self._segments.joined(segments)
+
+    def fork(self, override: FeedOverride) -> "LegPlanner":
+        """This leg as it is now, to be planned on with another feed from its last border on."""
+        other = copy.copy(self)
+        other._override = override
+        return other
 
     @property
     def due(self) -> bool:
@@ -116,15 +152,15 @@ class LegPlanner:
         span = (self._first, float(known))
         if span[1] <= span[0]:
             return None
-        found = cells(
-            path, segments.feed[path.segment], span, self._limits, passed=self._passed, inside=self._inside
-        )
+        feed = segments.wanted(self._override)[path.segment]
+        found = cells(path, feed, span, self._limits, passed=self._passed, inside=self._inside)
         speeds, forward = border_speeds(found, self._entry, None if rounded else 0.0)
         self._check_entry(speeds[0])
         count = len(found.start) if closes else _settled(found, speeds == forward)
         if count == 0:
             return None
-        leg = Leg(path, time_law(found.first(count), speeds[: count + 1]), segments)
+        law = time_law(found.first(count), speeds[: count + 1])
+        leg = Leg(path, law, segments, self._number, self._passed)
         if not closes:
             self._advance(found, count, float(speeds[count]))
         return leg

@@ -1,5 +1,6 @@
 """Commands -> stretches: legs run without stopping, and stands between them."""
 
+import copy
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -9,7 +10,7 @@ import numpy as np
 
 from cdhr_host.motion.arc import chords
 from cdhr_host.motion.curves import points_on
-from cdhr_host.motion.leg import BATCH, LegPlanner, Segments
+from cdhr_host.motion.leg import AS_PROGRAMMED, BATCH, FeedOverride, LegPlanner, Segments
 from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.sampling import Stand, Stretch, Timeline
 from cdhr_host.motion.smooth_path import norms
@@ -40,6 +41,8 @@ class Planner:
     def __init__(self, limits: MotionLimits, at_G: Array) -> None:
         self._usual = self._limits = limits
         self._exact = False
+        self._override = AS_PROGRAMMED
+        self._number = 0
         self._leg = LegPlanner(limits)
         self._direction: Array | None = None
         self._at = np.array(at_G, dtype=float)
@@ -48,13 +51,19 @@ class Planner:
     @property
     def standing(self) -> Stand:
         """Where the nozzle stands after ``close``, for no time."""
-        return Stand(self._at, 0.0, 0.0, self._line)
+        return Stand(self._at, 0.0, 0.0, self._line, self._number)
 
     def moved_to(self, at_G: Array) -> "Planner":
         """A planner that takes corners as this one does, at rest in (3,) m, with nothing drawn."""
         moved = Planner(self._usual, at_G)
         moved._blend(self._limits, exact=self._exact)
         return moved
+
+    def fork(self, override: FeedOverride = AS_PROGRAMMED) -> "Planner":
+        """This planner as it is now, to be fed on apart from it, with another feed."""
+        other = copy.copy(self)
+        other._override, other._leg = override, self._leg.fork(override)
+        return other
 
     def stretches(self, command: Command) -> Iterator[Stretch]:
         """Stretches that a further command settles."""
@@ -63,7 +72,8 @@ class Planner:
     def close(self) -> Iterator[Stretch]:
         """Bring the current leg to rest."""
         leg = self._leg.plan(closes=True)
-        self._leg = LegPlanner(self._limits)
+        self._number += 1
+        self._leg = LegPlanner(self._limits, self._number, self._override)
         self._direction = None
         if leg is not None:
             yield leg
@@ -123,7 +133,7 @@ class Planner:
     def _blend(self, limits: MotionLimits, *, exact: bool) -> None:
         """Take corners so from here on; the nozzle is at rest."""
         self._limits, self._exact = limits, exact
-        self._leg = LegPlanner(limits)
+        self._leg = LegPlanner(limits, self._number, self._override)
 
     def _curve(self, command: Arc | Spline, points: Array) -> Iterator[Stretch]:
         """Draw a curve through (M + 1, 3) m; clay is even along it."""
@@ -170,7 +180,7 @@ class Planner:
     def _stand(self, duration: float, flow: float, line: int) -> Iterator[Stretch]:
         yield from self.close()
         self._line = line
-        yield Stand(self._at, duration, flow, line)
+        yield Stand(self._at, duration, flow, line, self._number)
 
 
 def all_tracks(planner: Planner, timeline: Timeline, commands: Iterable[Command]) -> Iterator[ToolTrack]:

@@ -28,6 +28,8 @@ class Stand:
     flow: float
     """m³/s"""
     line: int
+    number: int = 0
+    """of the drawn leg that follows"""
 
 
 Stretch = Leg | Stand
