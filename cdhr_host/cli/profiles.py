@@ -52,7 +52,7 @@ def show(name: Name = "paper", json_: Json = False) -> None:
     for part, rows in sections.items():
         emit(f"[{part}]")
         for key, value, text in rows:
-            assignment = f"{key} = {json.dumps(value, ensure_ascii=False)}"
+            assignment = f"{key} = {_toml(value)}"
             emit(f"{assignment:<42} # {text}" if text else assignment)
         emit("")
 
@@ -81,6 +81,13 @@ def check(
             refusals.append(str(refusal))
     if refusals:
         raise Refusal("\n".join(refusals), ProfileError.exit_code)
+
+
+def _toml(value: Any) -> str:
+    """A value as TOML writes it."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_toml(key)} = {_toml(each)}" for key, each in value.items()) + "}"
+    return json.dumps(value, ensure_ascii=False)
 
 
 def _sections(profile: "Profile") -> dict[str, list[tuple[str, Any, str]]]:
