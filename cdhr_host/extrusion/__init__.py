@@ -1,5 +1,6 @@
 """Flow -> air: the pressure that pushes the planned flow of clay."""
 
+from cdhr_host.extrusion.material import bores, clay_findings, flow_law
 from cdhr_host.extrusion.pressure import AirCommand, air_command
 from cdhr_host.extrusion.rheology import Channel, ChannelFlow, LinearFlow, Material, PressureFlow
 
@@ -11,4 +12,7 @@ __all__ = [
     "Material",
     "PressureFlow",
     "air_command",
+    "bores",
+    "clay_findings",
+    "flow_law",
 ]

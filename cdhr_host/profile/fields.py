@@ -24,6 +24,7 @@ IN_DEG = to_si(DEG)
 IN_KPA = to_si(KPA)
 IN_MS = to_si(MS)
 IN_KPA_S_MM3 = to_si(KPA / MM3)
+IN_MM3_KPA = to_si(MM3 / KPA)
 
 
 class Section(BaseModel):

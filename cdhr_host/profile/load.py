@@ -31,7 +31,11 @@ def profile_names() -> dict[str, Path]:
 
 def find(name_or_path: str) -> Path:
     """The file of a profile; raises ProfileError with the nearest known name."""
-    names = profile_names()
+    return find_among(profile_names(), name_or_path, "profile")
+
+
+def find_among(names: dict[str, Path], name_or_path: str, kind: str) -> Path:
+    """The file of an installed name, or that path; raises ProfileError with the nearest name."""
     if name_or_path in names:
         return names[name_or_path]
     path = Path(name_or_path)
@@ -40,7 +44,7 @@ def find(name_or_path: str) -> Path:
     near = difflib.get_close_matches(name_or_path, names, n=1, cutoff=0.4)
     hint = f"did you mean '{near[0]}'?" if near else "give one of these, or the path of a .toml file"
     known = ", ".join(names)
-    raise ProfileError(Problem("missing", f"no profile '{name_or_path}'; installed are: {known}", hint=hint))
+    raise ProfileError(Problem("missing", f"no {kind} '{name_or_path}'; installed are: {known}", hint=hint))
 
 
 def read_table(path: Path) -> dict[str, Any]:
@@ -74,8 +78,13 @@ def validate(table: dict[str, Any]) -> tuple[Profile, list[Problem]]:
         return Profile.model_validate(table), []
     except ValidationError as error:
         details = error.errors(include_url=False)
-    problems = [_problem(detail) for detail in details]
+        problems = problems_of(error, Profile)
     return Profile.model_validate(_mended(table, details)), problems
+
+
+def problems_of(error: ValidationError, model: type[BaseModel]) -> list[Problem]:
+    """Every finding about a file of this model's sections, in the words of its author."""
+    return [_problem(detail, model) for detail in error.errors(include_url=False)]
 
 
 def _mended(table: dict[str, Any], details: list[ErrorDetails]) -> dict[str, Any]:
@@ -93,17 +102,17 @@ def _mended(table: dict[str, Any], details: list[ErrorDetails]) -> dict[str, Any
     return mended
 
 
-def _problem(detail: ErrorDetails) -> Problem:
+def _problem(detail: ErrorDetails, model: type[BaseModel]) -> Problem:
     """One pydantic finding in the words of a profile's author."""
     place = ".".join(map(str, detail["loc"]))
     kind, value = detail["type"], detail["input"]
     shown = value if isinstance(value, (int, float, str)) and not isinstance(value, bool) else None
     if kind == "extra_forbidden":
         return Problem(
-            "unknown", f"unknown key {place}", key=place, value=shown, hint=_nearest(detail["loc"])
+            "unknown", f"unknown key {place}", key=place, value=shown, hint=_nearest(detail["loc"], model)
         )
     if kind == "missing":
-        return Problem("missing", f"{place} is missing", key=place, hint=_meaning(detail["loc"]))
+        return Problem("missing", f"{place} is missing", key=place, hint=_meaning(detail["loc"], model))
     limit = next(iter(detail.get("ctx", {}).values()), None)
     message = detail["msg"][0].lower() + detail["msg"][1:]
     return Problem(
@@ -113,7 +122,7 @@ def _problem(detail: ErrorDetails) -> Problem:
         value=shown,
         limit=limit if isinstance(limit, (int, float)) else str(limit) if limit is not None else None,
         unit=_unit(str(detail["loc"][-1])),
-        hint=_meaning(detail["loc"]),
+        hint=_meaning(detail["loc"], model),
     )
 
 
@@ -122,9 +131,9 @@ def _unit(key: str) -> str | None:
     return key.removeprefix(name).strip("_") or None
 
 
-def _section_keys(section: str) -> dict[str, str]:
+def _section_keys(section: str, model: type[BaseModel]) -> dict[str, str]:
     """Keys of a section as the file spells them -> their descriptions."""
-    field = Profile.model_fields.get(section)
+    field = model.model_fields.get(section)
     if field is None or not isinstance(field.annotation, type) or not issubclass(field.annotation, BaseModel):
         return {}
     return {
@@ -132,16 +141,16 @@ def _section_keys(section: str) -> dict[str, str]:
     }
 
 
-def _nearest(loc: tuple[int | str, ...]) -> str:
-    known = list(Profile.model_fields) if len(loc) == 1 else list(_section_keys(str(loc[0])))
+def _nearest(loc: tuple[int | str, ...], model: type[BaseModel]) -> str:
+    known = list(model.model_fields) if len(loc) == 1 else list(_section_keys(str(loc[0]), model))
     near = difflib.get_close_matches(str(loc[-1]), known, n=1, cutoff=0.5)
     return f"did you mean '{near[0]}'?" if near else f"known here: {', '.join(known)}"
 
 
-def _meaning(loc: tuple[int | str, ...]) -> str | None:
+def _meaning(loc: tuple[int | str, ...], model: type[BaseModel]) -> str | None:
     if len(loc) < 2:
         return "a profile needs this section; copy it from an installed profile (cdhr profile list)"
-    text = _section_keys(str(loc[0])).get(str(loc[1]))
+    text = _section_keys(str(loc[0]), model).get(str(loc[1]))
     return f"{loc[1]}: {text}" if text else None
 
 

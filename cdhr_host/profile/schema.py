@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from cdhr_host.profile.body import Forces, Geometry, Machine, Platforms, Sliders, Spring, Stretch
+from cdhr_host.profile.clay import Clay
 from cdhr_host.profile.fields import (
     IN_DEG,
     IN_KPA,
@@ -21,6 +22,7 @@ from cdhr_host.profile.fields import (
     to_si,
 )
 from cdhr_host.profile.serving import Serve
+from cdhr_host.units import MM
 
 
 class Limits(Section):
@@ -124,6 +126,21 @@ class Extruder(Section):
     pressure_max: Annotated[
         float, key("pressure_max_kpa", "greatest pressure of the air supply", gt=0, le=2000), IN_KPA
     ]
+    material: Annotated[
+        str,
+        Field(description="name or path of a material profile; empty takes [clay]", max_length=400),
+    ] = ""
+    nozzle_bore_length: Annotated[
+        float, key("nozzle_bore_length_mm", "length of the nozzle's cylindrical bore", gt=0, le=1e3), IN_MM
+    ] = 20.0 * MM
+    hose_diameter: Annotated[
+        float,
+        key("hose_diameter_mm", "bore of the hose or reservoir the clay comes through", gt=0, le=1e3),
+        IN_MM,
+    ] = 20.0 * MM
+    hose_length: Annotated[
+        float, key("hose_length_mm", "length of clay in that hose; 0 is none", ge=0, le=1e5), IN_MM
+    ] = 500.0 * MM
 
 
 class Air(Section):
@@ -257,6 +274,7 @@ class Profile(Section):
     path: PathRules
     bed: Bed
     extruder: Extruder
+    clay: Clay = Clay()
     air: Air
     drives: Drives
     canopen: CanOpen
