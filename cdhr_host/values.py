@@ -234,6 +234,12 @@ class Setpoints(_Frozen):
     def __getitem__(self, rows: slice | Flags) -> "Setpoints":
         return Setpoints(*(getattr(self, field.name)[rows] for field in fields(self)))
 
+    @classmethod
+    def joined(cls, parts: "Sequence[Setpoints]") -> "Setpoints":
+        """One after the other."""
+        columns = ([getattr(part, field.name) for part in parts] for field in fields(cls))
+        return cls(*(np.concatenate(column) for column in columns))
+
 
 @dataclass(frozen=True, slots=True)
 class Feedback(_Frozen):
@@ -253,6 +259,8 @@ class Feedback(_Frozen):
     """(N,) Pa, measured"""
     force: Array = field(default_factory=lambda: np.zeros((0, 3)))
     """(N, 3) N, measured forces of cables 1-3; (0, 3) where there are no sensors"""
+    deposited: Array = field(default_factory=lambda: np.zeros(0))
+    """(N,) m³/s of clay that left the nozzle, simulated; (0,) where nobody can know"""
 
     def __len__(self) -> int:
         return len(self.tick)

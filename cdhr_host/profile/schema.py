@@ -130,17 +130,28 @@ class Extruder(Section):
         str,
         Field(description="name or path of a material profile; empty takes [clay]", max_length=400),
     ] = ""
+    lead: Annotated[
+        Literal["off", "identified", "on"],
+        Field(
+            description="air acts early by dead times and lags: always, or once [clay] has a dead time or lag"
+        ),
+    ] = "identified"
+    coast: Annotated[
+        float,
+        key("coast_mm", "end of every bead that is left to the clay still running out", ge=0, le=100),
+        IN_MM,
+    ] = 0.0
     nozzle_bore_length: Annotated[
         float, key("nozzle_bore_length_mm", "length of the nozzle's cylindrical bore", gt=0, le=1e3), IN_MM
     ] = 20.0 * MM
     hose_diameter: Annotated[
         float,
-        key("hose_diameter_mm", "bore of the hose or reservoir the clay comes through", gt=0, le=1e3),
+        key("hose_diameter_mm", "bore of the hose or cartridge the clay comes through", gt=0, le=1e3),
         IN_MM,
-    ] = 20.0 * MM
+    ] = 40.0 * MM
     hose_length: Annotated[
-        float, key("hose_length_mm", "length of clay in that hose; 0 is none", ge=0, le=1e5), IN_MM
-    ] = 500.0 * MM
+        float, key("hose_length_mm", "length of clay in it; 0 is none", ge=0, le=1e5), IN_MM
+    ] = 150.0 * MM
 
 
 class Air(Section):
