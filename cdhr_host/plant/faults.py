@@ -62,16 +62,24 @@ class Faults:
         play = self.budget.play
         if not play:
             return tuple(slider)
-        return tuple(max(own - play, min(own + play, was)) for was, own in zip(before, slider, strict=True))
+        return tuple(
+            [
+                own - play if was < own - play else own + play if was > own + play else was
+                for was, own in zip(before, slider, strict=True)
+            ]
+        )
 
     def run_out(self, cable: Sequence[float], radius: float) -> tuple[float, ...]:
         """(6,) m the cables have run -> what they really paid out, nothing at 0."""
         most = self.budget.run_out
         if not most:
             return tuple(cable)
+        per = 1.0 / radius
         return tuple(
-            ran + most * (sin(ran / radius + phase) - sin(phase))
-            for ran, phase in zip(cable, self.phase, strict=True)
+            [
+                ran + most * (sin(per * ran + phase) - sin(phase))
+                for ran, phase in zip(cable, self.phase, strict=True)
+            ]
         )
 
 

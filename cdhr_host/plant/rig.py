@@ -5,17 +5,16 @@ platforms really are is in the state.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from cdhr_host.plant.bodies import Bodies, BodiesState, Build
+from cdhr_host.plant.bodies import Bodies, BodiesState, Build, Wound
 from cdhr_host.plant.faults import ENCODERS, FAULTLESS, FORCES, Faults
 from cdhr_host.plant.held import Held
 from cdhr_host.plant.noise import normal
 from cdhr_host.plant.servo import Servo
-from cdhr_host.plant.strands import SLIDER, Point, Strands
+from cdhr_host.plant.strands import Point, Strands
 from cdhr_host.profile.schema import Profile
 from cdhr_host.values import Array
 
@@ -41,8 +40,7 @@ class RigState(NamedTuple):
     """sliders and tensions of the last ticks, newest last, as the sensors take them"""
 
 
-@dataclass(frozen=True, slots=True)
-class Sensed:
+class Sensed(NamedTuple):
     """What the drives report at a tick."""
 
     slider: Array
@@ -71,23 +69,27 @@ class Rig:
         self._period = profile.drives.period
         self._trace, self._determinant, self._kick = Servo(profile.drives).recurrence
         self._counts = profile.drives.encoder / profile.sliders.screw_lead
-        self._steps = int(np.ceil(self._period / LONGEST_STEP))
+        self._per = 1.0 / self._period
+        steps = int(np.ceil(self._period / LONGEST_STEP))
+        self._inner = self._period / steps
+        self._middles = [(n + 0.5) * self._inner for n in range(steps)]
 
     def step(self, state: RigState, setpoint: Sequence[float]) -> RigState:
         """(6,) m of slider setpoints, reached linearly during the tick -> the state after it."""
-        rate = tuple((new - old) / self._period for new, old in zip(setpoint, state.setpoint, strict=True))
-        error = tuple(
-            self._trace * e1 - self._determinant * e2 - self._kick * (new - old)
+        per, trace, determinant, kick = self._per, self._trace, self._determinant, self._kick
+        rate = [per * (new - old) for new, old in zip(setpoint, state.setpoint, strict=True)]
+        error = [
+            trace * e1 - determinant * e2 - kick * (new - old)
             for e1, e2, new, old in zip(state.error, state.error_before, rate, state.rate, strict=True)
-        )
-        slider = tuple(told + off for told, off in zip(setpoint, error, strict=True))
+        ]
+        slider = tuple([told + off for told, off in zip(setpoint, error, strict=True)])
         cable = self.faults.lagging(state.cable, slider)
         bodies, tension = self._moved(state, cable)
         return RigState(
             state.tick + 1,
             tuple(setpoint),
-            rate,
-            error,
+            tuple(rate),
+            tuple(error),
             state.error,
             cable,
             bodies,
@@ -96,28 +98,26 @@ class Rig:
 
     def sensed(self, state: RigState) -> Sensed:
         """What is heard at a tick: delayed, counted, noisy. The rig must have been stepped."""
-        slider, tension = state.readings[0]
         budget, seed = self.faults.budget, self.faults.seed
-        noise = budget.encoder * normal(seed, ENCODERS, state.tick, 6)
-        return Sensed(
-            slider=np.rint((np.array(slider) + noise) * self._counts) / self._counts,
-            tension=np.array(tension) + budget.force * normal(seed, FORCES, state.tick, 6),
-        )
+        slider, tension = (np.array(reading) for reading in state.readings[0])
+        if budget.encoder:
+            slider += budget.encoder * normal(seed, ENCODERS, state.tick, 6)
+        if budget.force:
+            tension += budget.force * normal(seed, FORCES, state.tick, 6)
+        return Sensed(np.rint(slider * self._counts) / self._counts, tension)
 
     def _moved(self, state: RigState, cable: Six) -> tuple[BodiesState, Six]:
         """Platforms at the end of a tick in which the cables run to ``cable``, and the six forces."""
         end = self.faults.run_out(cable, self._radius)
-        start = self.faults.run_out(state.cable, self._radius)
         if self._held is not None:
             return self._placed(self._held, state.bodies, end)
-        rate = tuple((b - a) / self._period for a, b in zip(start, end, strict=True))
-        dt = self._period / self._steps
-        bodies: BodiesState = state.bodies
-        felt: Sequence[float] = ()
-        for n in range(self._steps):
-            part = (n + 0.5) * dt
-            wound = self._bodies.wound([a + part * v for a, v in zip(start, rate, strict=True)], rate)
-            bodies, felt = self._bodies.stepped(bodies, wound, dt)
+        start = self.faults.run_out(state.cable, self._radius)
+        rate_of = [self._per * (b - a) for a, b in zip(start, end, strict=True)]
+        length, rate = self._bodies.wound(start, rate_of)
+        commands = [
+            Wound([at + part * v for at, v in zip(length, rate, strict=True)], rate) for part in self._middles
+        ]
+        bodies, felt = self._bodies.through(state.bodies, commands, self._inner)
         return bodies, paired(felt)
 
     def _placed(self, held: Held, before: BodiesState, cable: Six) -> tuple[BodiesState, Six]:
@@ -131,16 +131,10 @@ class Rig:
         ), ZERO
 
     def _speed(self, was: Point, now: Point) -> Point:
-        return (
-            (now[0] - was[0]) / self._period,
-            (now[1] - was[1]) / self._period,
-            (now[2] - was[2]) / self._period,
-        )
+        return self._per * (now[0] - was[0]), self._per * (now[1] - was[1]), self._per * (now[2] - was[2])
 
 
 def paired(nine: Sequence[float]) -> Six:
     """Nine forces -> six: what the sensor of each slider feels."""
-    found = [0.0] * 6
-    for force, slider in zip(nine, SLIDER, strict=True):
-        found[slider] += force
-    return tuple(found)
+    a, b, c, d, e, f, *upper = nine
+    return (a + d, b + e, c + f, *upper)

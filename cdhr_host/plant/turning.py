@@ -18,22 +18,48 @@ def rotation(turn: Turn) -> tuple[Vector, Vector, Vector]:
     )
 
 
-def turned(turn: Turn, spin: Vector, dt: float) -> Turn:
-    """A quaternion after turning at ``spin`` rad/s, given in W, for ``dt`` s; a unit one again."""
-    sx, sy, sz = spin
-    rate = sqrt(sx * sx + sy * sy + sz * sz)
-    if rate == 0.0:
-        return turn
-    half = 0.5 * rate * dt
-    c, s = cos(half), sin(half) / rate
-    sx, sy, sz = s * sx, s * sy, s * sz
+def turned(turn: Turn, spin: Vector, inertia: tuple[float, float], dt: float) -> tuple[Turn, Vector]:
+    """Free motion for ``dt`` s of a body that is round about its z, exactly: turn and spin after it.
+
+    ``inertia`` is kg m² across and about z, ``spin`` rad/s in W. The angular momentum h stays in
+    space, so the body turns about it at h over the inertia across while it turns about its own z
+    at (1/about - 1/across) h·z.
+    """
+    (sx, sy, sz), (across, about) = spin, inertia
+    if not (sx or sy or sz):
+        return turn, spin
     w, x, y, z = turn
-    a = c * w - sx * x - sy * y - sz * z
-    b = c * x + sx * w + sy * z - sz * y
-    d = c * y + sy * w + sz * x - sx * z
-    e = c * z + sz * w + sx * y - sy * x
-    size = 1.0 / sqrt(a * a + b * b + d * d + e * e)
-    return a * size, b * size, d * size, e * size
+    ax, ay, az = 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
+    along = sx * ax + sy * ay + sz * az
+    more = (about / across - 1.0) * along
+    sx, sy, sz = sx + more * ax, sy + more * ay, sz + more * az
+    own = 0.5 * dt * more
+    rate = sqrt(sx * sx + sy * sy + sz * sz)
+    half = 0.5 * dt * rate
+    c, s = cos(half), sin(half) / rate if rate else 0.0  # a spin whose square is no number any more
+    hx, hy, hz = s * sx, s * sy, s * sz
+    a = c * w - hx * x - hy * y - hz * z
+    b = c * x + hx * w + hy * z - hz * y
+    d = c * y + hy * w + hz * x - hx * z
+    e = c * z + hz * w + hx * y - hy * x
+    c, s = cos(own), -sin(own)
+    w, x, y, z = a * c - e * s, b * c + d * s, d * c - b * s, e * c + a * s
+    size = 1.0 / sqrt(w * w + x * x + y * y + z * z)
+    w, x, y, z = w * size, x * size, y * size, z * size
+    ax, ay, az = 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
+    return (w, x, y, z), (sx - more * ax, sy - more * ay, sz - more * az)
+
+
+def spun(turn: Turn, spin: Vector, moment: Vector, inertia: tuple[float, float], dt: float) -> Vector:
+    """The spin, rad/s in W, after a ``moment`` N m acted for ``dt`` s on a body round about its z."""
+    (sx, sy, sz), (mx, my, mz), (w, x, y, z), (across, about) = spin, moment, turn, inertia
+    ax, ay, az = 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)
+    along = (ax * mx + ay * my + az * mz) * (1.0 / about - 1.0 / across)
+    return (
+        sx + dt * (mx / across + along * ax),
+        sy + dt * (my / across + along * ay),
+        sz + dt * (mz / across + along * az),
+    )
 
 
 def rotation_vector(turn: Turn) -> Vector:

@@ -23,6 +23,8 @@ DT = 2.5e-4
 STEPS = 160
 ERROR = 4e-3
 """of the energy put in: (omega DT)²/8 of the fastest mode, 700 rad/s"""
+QUARTER = 0.25
+"""of an error of second order is left in half the step"""
 ROUNDING = 1e-11
 """J, of the sums that make an energy"""
 
@@ -81,28 +83,26 @@ def shoved(rest: BodiesState, by: BodiesState) -> BodiesState:
     return rest._replace(velocity=by.velocity, spin=by.spin, upper_velocity=by.upper_velocity)
 
 
-def energies(bodies: Bodies, start: BodiesState, machine: Hung, dt: float = DT) -> Array:
-    """J above rest after each step; the stored ones, whatever the machine's damping."""
-    frictionless = machine.bodies(Build(damping=0.0, mass_height=bodies.build.mass_height))
-    wound, state = machine.wound(bodies), start
-    found = [frictionless.energy(state, wound)]
+def energies(bodies: Bodies, start: BodiesState, machine: Hung, dt: float = DT) -> tuple[Array, bool]:
+    """J above rest after each step, and whether every cable stayed taut."""
+    wound, state, taut = machine.wound(bodies), start, True
+    found = [bodies.energy(state, wound)]
     for _ in range(round(STEPS * DT / dt)):
-        state = bodies.step(state, wound, dt)
-        found.append(frictionless.energy(state, wound))
-    return np.array(found) - frictionless.energy(machine.state, wound)
+        state, felt = bodies.stepped(state, wound, dt)
+        taut = taut and min(felt) > 0.0
+        found.append(bodies.energy(state, wound))
+    return np.array(found) - bodies.energy(machine.state, wound), taut
 
 
 @settings(max_examples=60, deadline=None)
 @given(hung(), shoves())
 def test_nothing_feeds_or_drains_an_undamped_machine(machine: Hung, shove: BodiesState) -> None:
-    """What it errs is the integrator's: it shrinks with the step."""
+    """What it errs is the integrator's, of second order; a little more or less where cables go slack."""
     bodies, start = machine.bodies(Build(damping=0.0)), shoved(machine.state, shove)
-    errors = []
-    for dt in (DT, DT / 2):
-        found = energies(bodies, start, machine, dt)
-        errors.append(np.abs(found - found[0]).max())
-        assert errors[-1] <= ERROR * found[0] + ROUNDING
-    assert errors[1] <= 0.75 * errors[0] + ROUNDING
+    (whole, taut), (halves, _) = (energies(bodies, start, machine, dt) for dt in (DT, DT / 2))
+    error, finer = (np.abs(found - found[0]).max() for found in (whole, halves))
+    assert error <= ERROR * whole[0] + ROUNDING
+    assert finer <= (1.03 * QUARTER if taut else 0.4) * error + ROUNDING
 
 
 @settings(max_examples=60, deadline=None)
@@ -111,9 +111,26 @@ def test_damping_and_friction_only_take(
     machine: Hung, shove: BodiesState, damping: float, friction: float
 ) -> None:
     bodies = machine.bodies(Build(damping=damping, friction=friction))
-    found = energies(bodies, shoved(machine.state, shove), machine)
+    found, _ = energies(bodies, shoved(machine.state, shove), machine)
     assert (found - np.minimum.accumulate(found)).max() <= ERROR * found[0] + ROUNDING
     assert found[-1] <= 0.99 * found[0] + ROUNDING
+
+
+@settings(max_examples=40, deadline=None)
+@given(hung(), shoves(), st.floats(0.0, 2e-3), st.floats(0.0, 0.1))
+def test_the_balance_of_energy_closes(
+    machine: Hung, shove: BodiesState, damping: float, friction: float
+) -> None:
+    """What is there now is what was there less what dampers and slipping pulleys took."""
+    bodies = machine.bodies(Build(damping=damping, friction=friction))
+    wound, state = machine.wound(bodies), shoved(machine.state, shove)
+    first, lost = bodies.energy(state, wound), 0.0
+    put_in = first - bodies.energy(machine.state, wound)
+    for _ in range(STEPS):
+        after = bodies.step(state, wound, DT)
+        lost += bodies.work(state, after, wound, DT).lost
+        state = after
+    assert abs(bodies.energy(state, wound) - (first - lost)) <= 0.01 * put_in + ROUNDING
 
 
 @settings(max_examples=60, deadline=None)
@@ -126,7 +143,9 @@ def test_static_forces_keep_both_platforms_where_they_are(machine: Hung) -> None
         state = machine.state
         for _ in range(100):
             state = bodies.step(state, command, 4 * DT)
-        moved = [np.abs(np.subtract(now, was)).max() for now, was in zip(state, machine.state, strict=True)]
+        moved = [
+            np.abs(np.subtract(now, was)).max() for now, was in zip(state[:6], machine.state[:6], strict=True)
+        ]
         assert max(moved) < 1e-9
 
 
