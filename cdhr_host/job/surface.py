@@ -156,8 +156,11 @@ class LineFeed(Protocol):
     out, the machine comes to rest at the end of the last one and stays PRINTING.
     """
 
-    def offer(self, line: str) -> bool:
-        """Take one line of G-code, without its end; False, and not taken, while there is no room."""
+    def offer(self, line: str, *, typed: bool = False) -> bool:
+        """Take one line of G-code, without its end; False, and not taken, while there is no room.
+
+        A refused line that was ``typed`` by a person, alone, is only told; nothing is held for it.
+        """
         ...
 
     @property
