@@ -12,8 +12,9 @@ outside the funnel for ``patience`` samples in a row stops the machine on its pa
 silent for ``timeout`` leaves the shift where it is, and says so.
 
 The upper platform is shifted with the lower one, and further up or down so that the force
-sensors of cables 4-6 show the planned vertical pull: 1 N for each mm against the spring. Both
-corrections are rate-limited, and one that would leave its range stops the machine.
+sensors of cables 4-6 show the planned vertical pull: 1 N for each mm against the spring. The
+rate limit holds for both together, the nozzle's correction first, so that neither platform is
+moved faster; a correction that would leave its range stops the machine.
 """
 
 import math
@@ -38,7 +39,7 @@ class OuterSettings:
     gain: float = 1.5
     """1/s: Ki; stable up to pi/2 over the latency, more than 2 gains nothing"""
     rate: float = 2.0 * MM
-    """m/s the shift moves at most"""
+    """m/s each platform's corrections move it at most"""
     range: float = 15.0 * MM
     """m the shift may be away from the plan; the wall of what calibration should have caught"""
     funnel: Funnel = field(default_factory=Funnel)
@@ -145,9 +146,15 @@ class Outer:
         equations = self._platforms.at(plan.position)
         short = equations.tension(plan.acceleration)[3:] - seen.tension[3:]
         missing = float(equations.pull[5, 3:] @ short) / self._stiffness
-        move = max(-g.rate, min(g.rate, g.tension_gain * missing))
+        move = self._room(state.drift, g.tension_gain * missing)
         rise = state.rise + dt * move
         return replace(state, mode=Mode.STOP) if abs(rise) > g.tension_range else replace(state, rise=rise)
+
+    def _room(self, drift: Array, move: float) -> float:
+        """What of a vertical ``move``, m/s, the rate limit leaves beside the shift's drift."""
+        x, y, z = drift.tolist()
+        left = math.sqrt(max(self.settings.rate**2 - x * x - y * y, 0.0))
+        return max(-left - z, min(left - z, move))
 
     def _notice(self, state: OuterState, t: float) -> str:
         if state.mode is Mode.CLOSED:

@@ -167,3 +167,19 @@ def test_a_force_correction_beyond_its_range_stops() -> None:
     assert mode is Mode.STOP
     assert "for the force" in action.notice
     assert abs(float(action.shift[5])) <= 2e-4
+
+
+def test_both_corrections_together_keep_the_rate() -> None:
+    """A nozzle too low and cables 4-6 too slack: the upper platform still moves at 2 mm/s at most."""
+    outer, nothing = Outer(PAPER), np.zeros(6)
+    state, before, fastest, used = outer.start(), np.zeros(6), 0.0, 0.0
+    for n in range(500):
+        sample = PoseSample(n * DT, np.array([-1e-3, 5e-4, -2e-3]) + before[:3], n)
+        seen = Seen(nothing, nothing, np.zeros(6), sample)
+        state, action = outer.step(state, Plan(n * DT, nothing, nothing, nothing), seen, DT)
+        assert action.mode is Mode.CLOSED
+        speed = (action.shift - before) / DT
+        fastest = max(fastest, float(np.linalg.norm(speed[3:])), float(np.linalg.norm(speed[:3])))
+        used, before = max(used, float(action.shift[5] - action.shift[2])), action.shift
+    assert fastest == pytest.approx(2e-3, rel=1e-9)
+    assert used > 1e-3
