@@ -41,7 +41,7 @@ class Planner:
     def __init__(self, limits: MotionLimits, at_G: Array) -> None:
         self._usual = self._limits = limits
         self._exact = False
-        self._override = AS_PROGRAMMED
+        self.override = AS_PROGRAMMED
         self._number = 0
         self._leg = LegPlanner(limits)
         self._direction: Array | None = None
@@ -62,7 +62,7 @@ class Planner:
     def fork(self, override: FeedOverride = AS_PROGRAMMED) -> "Planner":
         """This planner as it is now, to be fed on apart from it, with another feed."""
         other = copy.copy(self)
-        other._override, other._leg = override, self._leg.fork(override)
+        other.override, other._leg = override, self._leg.fork(override)
         return other
 
     def stretches(self, command: Command) -> Iterator[Stretch]:
@@ -73,7 +73,7 @@ class Planner:
         """Bring the current leg to rest."""
         leg = self._leg.plan(closes=True)
         self._number += 1
-        self._leg = LegPlanner(self._limits, self._number, self._override)
+        self._leg = LegPlanner(self._limits, self._number, self.override)
         self._direction = None
         if leg is not None:
             yield leg
@@ -133,7 +133,7 @@ class Planner:
     def _blend(self, limits: MotionLimits, *, exact: bool) -> None:
         """Take corners so from here on; the nozzle is at rest."""
         self._limits, self._exact = limits, exact
-        self._leg = LegPlanner(limits, self._number, self._override)
+        self._leg = LegPlanner(limits, self._number, self.override)
 
     def _curve(self, command: Arc | Spline, points: Array) -> Iterator[Stretch]:
         """Draw a curve through (M + 1, 3) m; clay is even along it."""

@@ -77,10 +77,19 @@ class Timed:
         for first in range(self.ticks.start, self.ticks.stop, BLOCK):
             yield self.track(np.arange(first, min(first + BLOCK, self.ticks.stop)))
 
+    @property
+    def begin(self) -> float:
+        """Tick, not a whole one, at which the stretch itself begins, before any shaping."""
+        return self.laid[-1].begin / self.period
+
+    def unshaped(self, tick: Ints, u: Array) -> ToolTrack:
+        """(N,) ticks to be named by, and the times (N,) in ticks of the plan -> the stretch at them."""
+        return self.laid[-1].track(tick, u * self.period)
+
     def track(self, tick: Ints) -> ToolTrack:
         """(N,) ascending ticks of this stretch -> the nozzle at them."""
         copies = [self._copy(tick, tick * self.period - delay) for delay in self.shaper.delay]
-        return copies[0] if len(copies) == 1 else _mean(copies, self.shaper)
+        return copies[0] if len(copies) == 1 else mean(copies, self.shaper)
 
     def _copy(self, tick: Ints, t: Array) -> ToolTrack:
         """The unshaped nozzle at times t (N,) s, ascending, perhaps reaching back."""
@@ -99,10 +108,15 @@ class Timeline:
 
     def __init__(self, period: float, shaper: Shaper = UNSHAPED) -> None:
         self.period = period
-        self._shaper = shaper
+        self.shaper = shaper
         self._laid: tuple[Laid, ...] = ()
         self._time = 0.0
         self._tick = 0
+
+    @property
+    def tick(self) -> int:
+        """The first that is not taken yet."""
+        return self._tick
 
     def lay(self, stretch: Stretch) -> Timed:
         """The next stretch, from where the last one ended."""
@@ -113,7 +127,7 @@ class Timeline:
     def rest(self, stand: Stand) -> Timed:
         """Stand until the first tick at which nothing moves any more; the next stretch begins there."""
         laid = self._add(stand)
-        still = self._time + self._shaper.length
+        still = self._time + self.shaper.length
         last = max(math.ceil(still / self.period - EARLY), self._tick)
         self._time = last * self.period
         return self._timed(laid, last + 1)
@@ -128,7 +142,7 @@ class Timeline:
 
     def _add(self, stretch: Stretch) -> tuple[Laid, ...]:
         """The stretch behind those that the shaper still sees from its begin on."""
-        seen = self._time - self._shaper.length
+        seen = self._time - self.shaper.length
         ends = [*(each.begin for each in self._laid[1:]), self._time]
         kept = [each for each, end in zip(self._laid, ends, strict=False) if end > seen]
         self._laid = (*kept, Laid(stretch, self._time))
@@ -136,7 +150,7 @@ class Timeline:
 
     def _timed(self, laid: tuple[Laid, ...], end: int) -> Timed:
         ticks, self._tick = range(self._tick, end), end
-        return Timed(laid, ticks, self.period, self._shaper)
+        return Timed(laid, ticks, self.period, self.shaper)
 
 
 def _standing(stand: Stand, tick: Ints) -> ToolTrack:
@@ -159,7 +173,7 @@ def _moving(leg: Leg, tick: Ints, t: Array) -> ToolTrack:
     return ToolTrack(tick, carried.line[segment], position, velocity, acceleration, flow, air)
 
 
-def _mean(copies: list[ToolTrack], shaper: Shaper) -> ToolTrack:
+def mean(copies: list[ToolTrack], shaper: Shaper) -> ToolTrack:
     """The weighted mean of copies; line and air words are those of the middle one."""
     named = copies[shaper.middle]
     position, velocity, acceleration, flow = (

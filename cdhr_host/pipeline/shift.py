@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdhr_host.mechanism import UpperMotion, transition
+from cdhr_host.motion.playback import Beat
 from cdhr_host.motion.sampling import Stand
 from cdhr_host.pipeline.rig import Rig
-from cdhr_host.values import Array, ToolTrack
+from cdhr_host.values import Array, Ints, ToolTrack
 
 SAME = 1e-9
 """m: nearer than this the upper platform need not move"""
@@ -46,3 +47,42 @@ def nozzle_standing(stand: Stand, ticks: range) -> ToolTrack:
     still, nothing = np.zeros((len(tick), 3)), np.zeros(len(tick))
     line = np.full(len(tick), stand.line)
     return ToolTrack(tick, line, still + stand.at_G, still, still.copy(), nothing, nothing.copy())
+
+
+def nozzle_standing_at(track: ToolTrack, tick: Ints) -> ToolTrack:
+    """Ticks (N,) at which the nozzle stands where ``track`` begins."""
+    still, nothing = np.zeros((len(tick), 3)), np.zeros(len(tick))
+    line = np.full(len(tick), track.line[0])
+    return ToolTrack(
+        tick, line, still + track.position_G[0], still, still.copy(), nothing, nothing.copy()
+    )
+
+
+def played_shift(step: Shift, tick: Ints, beat: Beat, period: float) -> Shift:
+    """A shift played at ``beat.u`` (N,), ticks of the plan within it.
+
+    Between two ticks of the plan it is the quintic that has their places, velocities and
+    accelerations.
+    """
+    u = np.clip(beat.u - float(step.track.tick[0]), 0.0, len(step.track.tick) - 1.0)
+    before = np.minimum(u.astype(np.int64), len(step.track.tick) - 2)
+    place, velocity, acceleration = _quintic(step.upper, before, (u - before)[:, None], period)
+    rate, slope = beat.rate[:, None], beat.slope[:, None] / period
+    motion = UpperMotion(place, rate * velocity, rate**2 * acceleration + slope * velocity)
+    return Shift(nozzle_standing_at(step.track, tick), motion)
+
+
+def _quintic(upper: UpperMotion, k: Ints, z: Array, period: float) -> tuple[Array, Array, Array]:
+    """Place, velocity and acceleration at the share z (N, 1) of the way from row k (N,) to the next."""
+    c0, c1, c2 = upper.place[k], upper.velocity[k] * period, upper.acceleration[k] * period**2 / 2
+    value = upper.place[k + 1] - c0 - c1 - c2
+    first = upper.velocity[k + 1] * period - c1 - 2 * c2
+    second = upper.acceleration[k + 1] * period**2 - 2 * c2
+    c3 = 10 * value - 4 * first + second / 2
+    c4 = -15 * value + 7 * first - second
+    c5 = 6 * value - 3 * first + second / 2
+    return (
+        c0 + z * (c1 + z * (c2 + z * (c3 + z * (c4 + z * c5)))),
+        (c1 + z * (2 * c2 + z * (3 * c3 + z * (4 * c4 + z * 5 * c5)))) / period,
+        (2 * c2 + z * (6 * c3 + z * (12 * c4 + z * 20 * c5))) / period**2,
+    )

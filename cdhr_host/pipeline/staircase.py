@@ -9,9 +9,11 @@ import numpy as np
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.extrusion import air_command
 from cdhr_host.mechanism import UpperMotion
+from cdhr_host.motion.leg import AS_PROGRAMMED, FeedOverride
 from cdhr_host.motion.limits import profile_shaper
 from cdhr_host.motion.planner import Planner
 from cdhr_host.motion.sampling import Timed, Timeline
+from cdhr_host.motion.shaping import Shaper
 from cdhr_host.pipeline.audit import Audit, on_bed
 from cdhr_host.pipeline.rig import Rig
 from cdhr_host.pipeline.shift import SAME, Shift, nozzle_standing, shift
@@ -82,20 +84,65 @@ class Staircase:
         Before a Pause comes everything up to rest. Raises ProgramError, after the last line,
         for text that is not understood.
         """
+        yield from self.opened()
+        for command in self.commands(chunks):
+            yield from self.settled(command)
+            yield command
+        yield from self.closed(ends=ends)
+
+    def commands(self, chunks: Iterable[bytes]) -> Iterator[Command]:
+        """A text's commands, by the modal state of those before it."""
+        return self._interpreter.commands(chunks)
+
+    def opened(self) -> Iterator[Shift]:
+        """What comes before a text's first command."""
         self._audit = Audit(self.profile)
         yield from self._shift(self._wanted())
-        for command in self._interpreter.commands(chunks):
-            for stretch in self._planner.stretches(command):
-                yield self._timeline.lay(stretch)
-            if isinstance(command, Pause):
-                yield self._timeline.rest(self._planner.standing)
-            yield command
+
+    def settled(self, command: Command) -> Iterator[Timed]:
+        """Stretches that a further command settles; all there are before a Pause."""
+        for stretch in self._planner.stretches(command):
+            yield self._timeline.lay(stretch)
+        if isinstance(command, Pause):
+            yield self._timeline.rest(self._planner.standing)
+
+    def closed(self, *, ends: bool) -> Iterator[Timed | Shift]:
+        """What comes after a text's last command, up to rest."""
         for stretch in self._planner.close():
             yield self._timeline.lay(stretch)
         yield self._timeline.rest(self._planner.standing)
         self._offset = self._wanted()
         if ends and self._at_reference():
             yield from self._shift(np.zeros(3))
+
+    def fork(self, override: FeedOverride = AS_PROGRAMMED) -> "Staircase":
+        """This machine as it is now, to be planned on apart from it, with another feed.
+
+        Text is read by one of them only.
+        """
+        other = copy.copy(self)
+        other._planner, other._timeline = self._planner.fork(override), copy.copy(self._timeline)
+        return other
+
+    @property
+    def tick(self) -> int:
+        """The first that is not planned yet."""
+        return self._timeline.tick
+
+    @property
+    def feed_override(self) -> FeedOverride:
+        """The feed it plans with."""
+        return self._planner.override
+
+    @property
+    def period(self) -> float:
+        """s between two ticks"""
+        return self._period
+
+    @property
+    def shaper(self) -> Shaper:
+        """What smooths the motion against ringing."""
+        return self._timeline.shaper
 
     def walk(self, chunks: Iterable[bytes], *, ends: bool = True) -> Iterator[Command | Checked]:
         """As ``timed``, with every setpoint of each stretch in its place."""
