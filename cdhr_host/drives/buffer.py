@@ -1,12 +1,14 @@
 """Rows fed and not executed yet: credit, order, reserve, and the stop."""
 
 import math
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from cdhr_host.drives.checks import STANDS_WITHIN, check_rows
 from cdhr_host.drives.rows import RowQueue
+from cdhr_host.errors import DriveError, Problem
 from cdhr_host.motion.hold import ends_at_rest, path_true_stop, rows_needed
 from cdhr_host.profile.schema import Profile
 from cdhr_host.values import Array, Setpoints
@@ -15,6 +17,23 @@ LOOK_AHEAD: Final = 0.5
 """s of real time the buffer lasts beyond the reserve for a stop"""
 MAX_LOOK_AHEAD: Final = 20_000
 """rows beyond the reserve, however fast the clock"""
+FIRM: Final = 2
+"""rows at the head of a buffer that are never replaced"""
+
+
+@dataclass(frozen=True, slots=True)
+class Revision:
+    """Rows that are to replace buffered ones, and what comes before them."""
+
+    first: int
+    rows: Setpoints
+    tail: Array
+    silent: bool
+
+    def rests(self, profile: Profile) -> bool:
+        """Whether the rows end at rest with the air off."""
+        end = np.vstack([self.tail, self.rows.slider[-2:]])[-2:]
+        return bool(self.rows.pressure[-1] == 0.0) and ends_at_rest(end, profile)
 
 
 class RowBuffer:
@@ -72,12 +91,71 @@ class RowBuffer:
         reach = STANDS_WITHIN if fresh else None
         check_rows(rows, self._profile, tick=self._next_tick, before=self._tail[1], reach=reach)
         accepted = rows[: self.free if room is None else max(room, 0)]
-        if len(accepted):
-            self._queue.append(accepted)
-            self._next_tick = int(accepted.tick[-1]) + 1
-            self._tail = np.vstack([self._tail, accepted.slider[-2:]])[-2:]
-            self._silent = bool(accepted.pressure[-1] == 0.0)
+        self._append(accepted)
         return len(accepted)
+
+    @property
+    def next_tick(self) -> int:
+        """The tick that ``feed`` expects; 0 before the first row of a run."""
+        return self._next_tick or 0
+
+    @property
+    def revisable(self) -> int:
+        """The first tick that ``revise`` may replace; ``next_tick`` where nothing can be replaced."""
+        if not len(self._queue):
+            return self.next_tick
+        return min(self._queue.first_tick() + FIRM, self.next_tick)
+
+    def revise(self, rows: Setpoints) -> None:
+        """Put ``rows`` in the place of everything from their first tick on, or raise DriveError.
+
+        They are checked as in ``feed``, and continue the row before them. All must fit.
+        """
+        self.replace(self.revision(rows))
+
+    def revision(self, rows: Setpoints) -> "Revision":
+        """Checked, and nothing changed yet; raises DriveError."""
+        if self._next_tick is None:
+            raise DriveError(Problem("state", "there is nothing to revise: no row was fed yet"))
+        first = int(rows.tick[0]) if len(rows) else self.next_tick
+        if not self.revisable <= first <= self.next_tick:
+            raise too_late(first, self.revisable, self.next_tick)
+        if len(rows) > (room := self.room_from(first)):
+            message = f"{len(rows)} rows from tick {first} on do not fit: there is room for {room}"
+            raise DriveError(Problem("overflow", message, value=len(rows), limit=room))
+        tail, silent = self._tail_before(first)
+        check_rows(rows, self._profile, tick=first, before=tail[-1], reach=None)
+        return Revision(first, rows, tail, silent)
+
+    def replace(self, revision: "Revision") -> None:
+        """Carry a revision out; what was taken of it meanwhile is not put in again."""
+        first = revision.first
+        at = self._queue.first_tick() if len(self._queue) else self.next_tick
+        self._queue.cut(max(first - at, 0))
+        self._next_tick, self._tail, self._silent = first, revision.tail, revision.silent
+        self._append(revision.rows)
+        if at > first:
+            self._queue.take(at - first)
+
+    def room_from(self, tick: int) -> int:
+        """Rows there is room for from a buffered tick on."""
+        return self.free + self.next_tick - tick
+
+    def _tail_before(self, first: int) -> tuple[Array, bool]:
+        """The last two rows before a tick, and whether the air is off in the last."""
+        if first == self.next_tick:
+            return self._tail, self._silent
+        rows = self._queue.take(len(self._queue))
+        self._queue.put_back(rows)
+        before = rows[: first - int(rows.tick[0])]
+        return before.slider[-2:], bool(before.pressure[-1] == 0.0)
+
+    def _append(self, rows: Setpoints) -> None:
+        if len(rows):
+            self._queue.append(rows)
+            self._next_tick = int(rows.tick[-1]) + 1
+            self._tail = np.vstack([self._tail, rows.slider[-2:]])[-2:]
+            self._silent = bool(rows.pressure[-1] == 0.0)
 
     def take(self, count: int) -> Setpoints:
         """The first rows, 1 <= count <= len."""
@@ -106,3 +184,18 @@ class RowBuffer:
     def drop(self) -> None:
         """Forget all rows."""
         self._queue.clear()
+
+
+def too_late(first: int, revisable: int, expected: int) -> DriveError:
+    """A revision that begins at a tick that is due already, or behind a gap."""
+    if first > expected:
+        return DriveError(Problem("order", f"tick {first} came where tick {expected} is due"))
+    return DriveError(
+        Problem(
+            "late-revision",
+            f"tick {first} can no longer be replaced: the first that can is tick {revisable}",
+            value=first,
+            limit=revisable,
+            hint="plan the rest anew from the link's revisable tick on",
+        )
+    )

@@ -47,7 +47,7 @@ def check_rows(
     ``reach`` m what the first row may be away from it (None: what the speed limit allows).
     Raises DriveError with one problem per kind, each at its first row.
     """
-    _check_shapes(rows)
+    check_shapes(rows)
     problems = list(_numbers(rows)) or [
         *_order(rows, tick),
         *_travel(rows, profile),
@@ -58,7 +58,8 @@ def check_rows(
         raise DriveError(problems)
 
 
-def _check_shapes(rows: Setpoints) -> None:
+def check_shapes(rows: Setpoints) -> None:
+    """DriveError unless every column has one entry a row."""
     count = len(rows)
     shapes = {"slider": (count, 6), "tension": (count, 6), "pressure": (count,), "line": (count,)}
     for name, shape in shapes.items():

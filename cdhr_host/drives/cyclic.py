@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from cdhr_host.drives.buffer import RowBuffer
+from cdhr_host.drives.base import TAKING, BufferedLink
 from cdhr_host.drives.canopen.axis import Axis
 from cdhr_host.drives.canopen.bus import Bus
 from cdhr_host.drives.canopen.homing import home
@@ -25,11 +25,9 @@ from cdhr_host.drives.clock import Clock
 from cdhr_host.drives.faults import fault
 from cdhr_host.drives.link import LinkState
 from cdhr_host.drives.reference import ReferenceStore, unreferenced
-from cdhr_host.drives.rows import joined, no_feedback
 from cdhr_host.drives.timing import CycleTiming
 from cdhr_host.drives.watch import first_fault, underrun
 from cdhr_host.errors import DriveError, Problem
-from cdhr_host.motion.hold import path_true_stop
 from cdhr_host.profile.schema import Profile
 from cdhr_host.values import Array, Feedback, Ints, Setpoints
 
@@ -46,26 +44,20 @@ class _Sent:
     counts: Ints
 
 
-class CyclicLink:
+class CyclicLink(BufferedLink):
     """MachineLink over CANopen; ``connect`` opens the bus, ``store`` keeps references."""
 
     def __init__(
         self, profile: Profile, clock: Clock, connect: Callable[[], Port], store: ReferenceStore
     ) -> None:
-        self.profile = profile
-        self.state = LinkState.CLOSED
-        self.stop_tick: int | None = None
+        super().__init__(profile, clock.speed)
         self.resolution = profile.canopen.position_unit
         self._connect = connect
         self._machine: CanopenMachine | None = None
         self._clock = clock
         self._store = store
         self._scaling = Scaling(profile)
-        self._buffer = RowBuffer(profile, clock.speed)
         self._flying: deque[_Sent | None] = deque()
-        self._executed: list[Feedback] = []
-        self._fault: DriveError | None = None
-        self._told = True
         self._held: Ints = np.zeros(6, dtype=np.int64)
         self._torque: Ints = np.zeros(6, dtype=np.int64)
         self._rested_at: float | None = None
@@ -86,14 +78,9 @@ class CyclicLink:
         return math.inf if self._machine is None else self._machine.due
 
     @property
-    def free(self) -> int:
-        """Rows that ``feed`` would accept."""
-        return self._buffer.free if self.state in (LinkState.ARMED, LinkState.RUNNING) else 0
-
-    @property
     def buffered(self) -> int:
         """Rows accepted whose outcome has not come back."""
-        return len(self._buffer) + sum(sent is not None for sent in self._flying)
+        return super().buffered + sum(sent is not None for sent in self._flying)
 
     @property
     def slider(self) -> Array:
@@ -109,14 +96,11 @@ class CyclicLink:
         """Lateness of the cycles since arming."""
         return self._machine.lateness.summary() if self._machine is not None else None
 
-    def stop_rows(self, ahead: Setpoints) -> Setpoints:
-        """What is played instead of ``ahead`` once the link stops."""
-        return path_true_stop(ahead, self.profile)
-
     def open(self) -> None:
         """CLOSED -> OPEN: bring-up."""
         self._expect(LinkState.CLOSED)
-        self._fault, self._told, self._homed = None, True, False
+        self._forget()
+        self._homed = False
         self._scaling = Scaling(self.profile)
         port = self._connect()
         try:
@@ -147,18 +131,33 @@ class CyclicLink:
     def feed(self, setpoints: Setpoints) -> int:
         """Buffer the first rows there is credit for; how many."""
         self._raise_fault()
-        self._expect(LinkState.ARMED, LinkState.RUNNING)
+        self._expect(*TAKING)
         self._scaling.feed_forward(np.where(np.isfinite(setpoints.tension), setpoints.tension, 0.0))
         count = self._buffer.feed(setpoints)
-        if self._buffer.primed:
-            self.state, self._playing = LinkState.RUNNING, True
+        self._run_when_primed()
         return count
 
-    def feedback(self) -> Feedback:
-        """What was executed since the last call."""
+    @property
+    def revisable(self) -> int:
+        """First tick that ``revise`` may still replace."""
+        return self._buffer.revisable
+
+    def revise(self, rows: Setpoints) -> None:
+        """Replace what is buffered from ``rows.tick[0]`` on; between two turns, so never half."""
         self._raise_fault()
-        executed, self._executed = self._executed, []
-        return joined(executed) if executed else no_feedback()
+        self._expect(*TAKING)
+        self._scaling.feed_forward(np.where(np.isfinite(rows.tension), rows.tension, 0.0))
+        self._buffer.revise(rows)
+        self._run_when_primed()
+
+    def room_from(self, tick: int) -> int:
+        """Rows a revision from this tick on may have."""
+        return self._buffer.room_from(tick)
+
+    @property
+    def next_tick(self) -> int:
+        """The tick that ``feed`` expects."""
+        return self._buffer.next_tick
 
     def stop(self) -> None:
         """Come to rest on the path, air off."""
@@ -209,6 +208,10 @@ class CyclicLink:
             self._tell(sent)
         except DriveError as gone:
             self._lose(gone)
+
+    def _run_when_primed(self) -> None:
+        if self._buffer.primed:
+            self.state, self._playing = LinkState.RUNNING, True
 
     def _tell(self, sent: _Sent | None) -> None:
         if sent is None:
@@ -277,9 +280,8 @@ class CyclicLink:
         )
 
     def _trip(self, found: DriveError) -> None:
-        if self._fault is not None:
+        if not self._note(found):
             return
-        self._fault, self._told = found, False
         self._forget_lost()
         if self.state is LinkState.RUNNING:
             self._begin_stop()
@@ -288,8 +290,7 @@ class CyclicLink:
 
     def _lose(self, gone: DriveError) -> None:
         """The bus is gone: nothing can be told any more; the drives' own watchdogs stop them."""
-        self._fault = self._fault or gone
-        self._told = False
+        self._note(gone)
         self._buffer.drop()
         self._flying.clear()
         self._rested_at = None
@@ -351,15 +352,3 @@ class CyclicLink:
             raise fault(
                 "drive-fault", f"drive {axis.node} is in fault (0x{axis.error:04X}): nothing may move"
             )
-
-    def _expect(self, *states: LinkState) -> None:
-        if self.state is LinkState.FAULT and self._fault is not None:
-            raise self._fault
-        if self.state not in states:
-            wanted = " or ".join(state.value for state in states)
-            raise DriveError(Problem("state", f"the drives are {self.state.value}, not {wanted}"))
-
-    def _raise_fault(self) -> None:
-        if self._fault is not None and not self._told:
-            self._told = True
-            raise self._fault

@@ -85,6 +85,24 @@ class MachineLink(Protocol):
         """Buffer the first rows there is credit for; how many. Checks all rows before it takes any."""
         ...
 
+    @property
+    def revisable(self) -> int:
+        """First tick that ``revise`` may still replace: what is played next, and a small guard.
+
+        The tick ``feed`` expects where nothing that can be replaced is buffered.
+        """
+        ...
+
+    def revise(self, rows: Setpoints) -> None:
+        """Replace everything buffered from ``rows.tick[0]`` on by ``rows``, all of them or none.
+
+        Checked as in ``feed``; the first row continues the one before it. Kind
+        ``late-revision`` when that tick is due already, or will be before the far side has
+        the rows: plan anew from ``revisable``. ``rows`` of less than the reserve of a stop that
+        do not end at rest are an underrun unless more is fed at once.
+        """
+        ...
+
     def feedback(self) -> Feedback:
         """What was executed since the last call; may be of no row."""
         ...

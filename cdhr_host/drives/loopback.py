@@ -9,21 +9,18 @@ import math
 
 import numpy as np
 
-from cdhr_host.drives.buffer import RowBuffer
+from cdhr_host.drives.base import TAKING, BufferedLink
 from cdhr_host.drives.checks import check_standing
 from cdhr_host.drives.clock import Clock
 from cdhr_host.drives.link import LinkState
-from cdhr_host.drives.rows import joined, no_feedback
-from cdhr_host.drives.timing import CycleTiming
 from cdhr_host.drives.watch import first_fault, underrun
-from cdhr_host.errors import DriveError, Problem
-from cdhr_host.motion.hold import path_true_stop
+from cdhr_host.errors import DriveError
 from cdhr_host.plant import Disturbance, Machine, undisturbed
 from cdhr_host.profile.schema import Profile
-from cdhr_host.values import Array, Feedback, Setpoints
+from cdhr_host.values import Array, Setpoints
 
 
-class Loopback:
+class Loopback(BufferedLink):
     """Six simulated servo axes and a pressure regulator behind a buffer of setpoints.
 
     A tick that is due when only the reserve for a stop is left is an underrun. The first row
@@ -39,49 +36,23 @@ class Loopback:
         standing: Array | None = None,
         disturbance: Disturbance = undisturbed,
     ) -> None:
-        self.profile = profile
-        self.state = LinkState.CLOSED
-        self.stop_tick: int | None = None
+        super().__init__(profile, clock.speed)
         self._clock = clock
         self._machine = Machine(profile, disturbance)
         self._plant = self._machine.standing(np.zeros(6) if standing is None else standing)
-        self._buffer = RowBuffer(profile, clock.speed)
-        self._executed: list[Feedback] = []
-        self._fault: DriveError | None = None
-        self._told = True
         self._epoch: float | None = None
         self._ticks = 0
         self._rested_at = clock.now()
-
-    @property
-    def free(self) -> int:
-        """Rows that ``feed`` would accept."""
-        if self.state not in (LinkState.ARMED, LinkState.RUNNING):
-            return 0
-        return self._buffer.free
-
-    @property
-    def buffered(self) -> int:
-        """Rows accepted and not executed yet."""
-        return len(self._buffer)
 
     @property
     def resolution(self) -> float:
         """M: the rows are taken as they are."""
         return 0.0
 
-    def timing(self) -> CycleTiming | None:
-        """Simulated time is never late."""
-        return None
-
-    def stop_rows(self, ahead: Setpoints) -> Setpoints:
-        """What is played instead of ``ahead`` once the link stops."""
-        return path_true_stop(ahead, self.profile)
-
     def open(self) -> None:
         """CLOSED -> OPEN; an earlier fault is forgotten."""
         self._expect(LinkState.CLOSED)
-        self._fault, self._told = None, True
+        self._forget()
         self.state = LinkState.OPEN
 
     def arm(self, start: Array) -> None:
@@ -98,25 +69,30 @@ class Loopback:
 
     def feed(self, setpoints: Setpoints) -> int:
         """Buffer the first rows there is credit for; how many."""
-        self._execute_due()
+        self._catch_up()
         self._raise_fault()
-        self._expect(LinkState.ARMED, LinkState.RUNNING)
+        self._expect(*TAKING)
         count = self._buffer.feed(setpoints)
-        if self._epoch is None and self._buffer.primed:
-            self._epoch, self._ticks = self._clock.now(), 0
-            self.state = LinkState.RUNNING
+        self._run_when_primed()
         return count
 
-    def feedback(self) -> Feedback:
-        """What was executed since the last call."""
-        self._execute_due()
+    @property
+    def revisable(self) -> int:
+        """First tick that ``revise`` may still replace."""
+        self._catch_up()
+        return self._buffer.revisable
+
+    def revise(self, rows: Setpoints) -> None:
+        """Replace what is buffered from ``rows.tick[0]`` on."""
+        self._catch_up()
         self._raise_fault()
-        executed, self._executed = self._executed, []
-        return joined(executed) if executed else no_feedback()
+        self._expect(*TAKING)
+        self._buffer.revise(rows)
+        self._run_when_primed()
 
     def stop(self) -> None:
         """Come to rest on the path, air off."""
-        self._execute_due()
+        self._catch_up()
         if self.state is LinkState.CLOSED:
             self._expect(LinkState.OPEN)
         elif self.state is LinkState.ARMED:
@@ -135,19 +111,12 @@ class Loopback:
         self._executed = []
         self.state = LinkState.CLOSED
 
-    def _expect(self, *states: LinkState) -> None:
-        if self.state is LinkState.FAULT and self._fault is not None:
-            raise self._fault
-        if self.state not in states:
-            wanted = " or ".join(state.value for state in states)
-            raise DriveError(Problem("state", f"the drives are {self.state.value}, not {wanted}"))
+    def _run_when_primed(self) -> None:
+        if self._epoch is None and self._buffer.primed:
+            self._epoch, self._ticks = self._clock.now(), 0
+            self.state = LinkState.RUNNING
 
-    def _raise_fault(self) -> None:
-        if self._fault is not None and not self._told:
-            self._told = True
-            raise self._fault
-
-    def _execute_due(self) -> None:
+    def _catch_up(self) -> None:
         """Execute all ticks that are due by the clock, and find out when they run out."""
         while self._epoch is not None:
             due = self._due(self._epoch)
@@ -182,7 +151,7 @@ class Loopback:
         self._trip(fault)
 
     def _trip(self, fault: DriveError) -> None:
-        self._fault, self._told = fault, False
+        self._note(fault)
         if self.state is LinkState.RUNNING:
             self._begin_stop()
 

@@ -63,6 +63,18 @@ class RowQueue:
         self._length -= count
         return joined(parts)
 
+    def cut(self, count: int) -> None:
+        """Drop all rows but the first ``count``."""
+        if count < self._length:
+            kept = self.take(count) if count else None
+            self.clear()
+            if kept is not None:
+                self.append(kept)
+
+    def first_tick(self) -> int:
+        """Tick of the next row; the queue must not be empty."""
+        return int(self._parts[0].tick[0])
+
     def clear(self) -> None:
         """Drop all rows."""
         self._parts.clear()

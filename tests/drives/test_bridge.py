@@ -18,6 +18,7 @@ from cdhr_host.drives.bridge.messages import NAKS, SETPOINTS, config, tick
 from cdhr_host.drives.sim.bridge import Bridge
 from cdhr_host.drives.sim.framing import cobs, plain
 from cdhr_host.errors import DriveError
+from cdhr_host.motion.hold import path_true_stop
 
 ZERO = np.zeros(6)
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "link.md"
@@ -69,6 +70,7 @@ def golden():
     return {
         "KEEPALIVE": Frame(Type.KEEPALIVE, 2, 1, 0x1234, struct.pack("<II", 1000, 42)),
         "STOP": Frame(Type.STOP, 3, 1, 0x1234, b"\0"),
+        "REVISE": Frame(Type.REVISE, 5, 1, 0x1234, SETPOINTS.pack(40, 1, 6, 3, 7) + row),
         "SETPOINTS": Frame(Type.SETPOINTS, 4, 1, 0x1234, SETPOINTS.pack(42, 1, 6, 1, 0) + row),
     }
 
@@ -110,7 +112,7 @@ def _sent(bench, start, rows, flags=0, session=None):
     """SETPOINTS straight from the wire, past the host's own checks."""
     body = b"".join(tick(np.array(row), np.zeros(6, dtype=np.int64), 0.0) for row in rows)
     payload = SETPOINTS.pack(start, len(rows), 6, flags, 0) + body
-    session = bench.link._session if session is None else session
+    session = bench.link._session.number if session is None else session
     bench.far.exchange(bench.clock.now(), encoded(Frame(Type.SETPOINTS, 1, 0, session, payload)))
 
 
@@ -120,9 +122,9 @@ def _armed():
     bench.link.arm(ZERO)
     bench.naks = []
     plain_nak = bench.far._nak
-    bench.far._nak = lambda reason: (bench.naks.append(NAKS[reason]), plain_nak(reason))
+    bench.far._nak = lambda refused: (bench.naks.append(NAKS[refused.reason]), plain_nak(refused))
     _sent(bench, 10, [[0] * 6] * 4)
-    assert bench.far._expected == 14
+    assert bench.far.store.expected == 14
     return bench
 
 
@@ -130,13 +132,13 @@ def test_24_gap_is_refused():
     bench = _armed()
     _sent(bench, 16, [[0] * 6])
     assert bench.naks == ["gap"]
-    assert bench.far._expected == 14
+    assert bench.far.store.expected == 14
 
 
 def test_24_duplicate_is_ignored():
     bench = _armed()
     _sent(bench, 10, [[0] * 6] * 4)
-    assert (bench.naks, len(bench.far._ticks), bench.far.code) == ([], 4, 0)
+    assert (bench.naks, len(bench.far.store.ticks), bench.far.code) == ([], 4, 0)
 
 
 def test_24_overlap_with_other_content_is_a_fault():
@@ -147,8 +149,8 @@ def test_24_overlap_with_other_content_is_a_fault():
 
 def test_24_frames_of_another_session_move_nothing():
     bench = _armed()
-    _sent(bench, 14, [[0] * 6], session=bench.link._session ^ 1)
-    assert bench.far._expected == 14
+    _sent(bench, 14, [[0] * 6], session=bench.link._session.number ^ 1)
+    assert bench.far.store.expected == 14
     assert bench.far.dropped == 1
 
 
@@ -159,7 +161,7 @@ def test_24_credit_overrun_is_refused():
         if bench.naks:
             break
     assert bench.naks == ["overflow"]
-    assert len(bench.far._ticks) <= 1024
+    assert len(bench.far.store.ticks) <= 1024
 
 
 @pytest.mark.parametrize(
@@ -169,7 +171,80 @@ def test_24_violation_is_a_fault_and_never_clipped(row, code):
     bench = _armed()
     _sent(bench, 14, [row])
     assert bench.far.code.name == code
-    assert len(bench.far._ticks) == 4
+    assert len(bench.far.store.ticks) == 4
+
+
+def _revised(bench, start, rows, flags, number):
+    body = b"".join(tick(np.array(row), np.zeros(6, dtype=np.int64), 0.0) for row in rows)
+    payload = SETPOINTS.pack(start, len(rows), 6, flags, number) + body
+    bench.far.exchange(
+        bench.clock.now(), encoded(Frame(Type.REVISE, 1, 0, bench.link._session.number, payload))
+    )
+
+
+def _stored(bench):
+    return [row[0] for row in bench.far.store.ticks]
+
+
+def test_revision_is_kept_aside_until_its_last_frame():
+    bench = _armed()
+    _revised(bench, 12, [[3] * 6] * 8, 0, 1)
+    _revised(bench, 20, [[3] * 6] * 8, 0, 1)
+    _revised(bench, 12, [[4] * 6] * 8, 0, 1)
+    assert _stored(bench) == [0] * 4
+    _revised(bench, 28, [[3] * 6] * 2, 2, 1)
+    assert _stored(bench) == [0] * 2 + [3] * 18
+    assert (bench.far.store.expected, bench.far.store.revision) == (30, 1)
+    _revised(bench, 28, [[5] * 6] * 2, 2, 1)
+    assert (_stored(bench), bench.naks) == ([0] * 2 + [3] * 18, [])
+
+
+def test_revision_with_a_lost_frame_is_not_carried_out():
+    bench = _armed()
+    _revised(bench, 12, [[3] * 6] * 8, 0, 1)
+    _revised(bench, 28, [[3] * 6] * 2, 2, 1)
+    assert (bench.naks, _stored(bench)) == (["gap"], [0] * 4)
+
+
+@pytest.mark.parametrize(("start", "said"), [(11, "late"), (15, "late")])
+def test_revision_of_a_tick_that_is_due_or_behind_a_gap_is_refused(start, said):
+    bench = _armed()
+    _revised(bench, start, [[0] * 6], 2, 1)
+    assert (bench.naks, _stored(bench)) == ([said], [0] * 4)
+
+
+def test_revision_is_checked_like_other_setpoints():
+    bench = _armed()
+    _revised(bench, 12, [[9000] * 6], 2, 1)
+    assert bench.far.code.name == "STEP"
+
+
+@pytest.mark.parametrize("side", ["inbound", "outbound"])
+def test_revision_over_a_bad_line_is_done_or_refused_but_never_half(side):
+    chance, kinds = random.Random(11), set()
+    for _ in range(8):
+        bench = BridgeBench()
+        bench.link.open()
+        rows = run_of(900, seed=4)
+        bench.link.arm(ZERO)
+        fed = bench.link.feed(rows)
+        bench.user.wait_until(bench.clock.now() + 0.2)
+        setattr(bench, side, lambda data: data if chance.random() > 0.2 else data[:-3])
+        first = bench.link.revisable
+        hold = path_true_stop(rows[first:fed], PAPER)
+        wanted = np.vstack([rows.slider[:first], hold.slider])
+        try:
+            bench.link.revise(hold)
+            rest = rows[:0]
+        except DriveError as refused:
+            kinds.add(refused.problems[0].kind)
+            wanted, rest = rows.slider, rows[fed:]
+        setattr(bench, side, lambda data: data)
+        while len(rest) or bench.link.buffered:
+            rest = rest[bench.link.feed(rest) :]
+            bench.user.wait_until(bench.clock.now() + 0.02)
+        assert (np.array(bench.far.received)[:, :6] == np.rint(wanted / bench.link.resolution)).all()
+    assert kinds <= {"late-revision"}
 
 
 def test_24_other_config_cannot_arm():

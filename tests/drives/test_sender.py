@@ -20,6 +20,7 @@ from cdhr_host.drives.sender import SenderLink
 from cdhr_host.drives.sender.ring import FEEDBACK, SETPOINTS, Ring, feedback, packed, setpoints, width
 from cdhr_host.errors import DriveError
 from cdhr_host.job import stream
+from cdhr_host.motion.hold import path_true_stop
 from cdhr_host.plant import Machine
 from cdhr_host.values import Feedback, Setpoints
 
@@ -118,6 +119,32 @@ def test_run_through_the_sender_is_received_tick_by_tick(tmp_path):
     received = np.loadtxt(far.record, delimiter=",", skiprows=1)[:, :6]
     wanted = np.rint(rows.slider / link.resolution)
     assert any((received[k : k + 500] == wanted).all() for k in range(len(received) - 499))
+
+
+@pytest.mark.parametrize("later", [0, 400], ids=["in the sender", "in the ring"])
+def test_revision_is_carried_out_by_the_sender(tmp_path, later):
+    """The rows of the sender's own buffer, or those still in the ring, are replaced at one tick."""
+    with running(tmp_path) as (far, link, rows):
+        _until(lambda: link.feedback() is not None and link.buffered < 800)
+        first = link.revisable + later
+        hold = path_true_stop(rows[first:1024], PATIENT)
+        link.revise(hold)
+        with pytest.raises(DriveError, match="can no longer be replaced"):
+            link.revise(rows[10:500])
+        _until(lambda: len(link.feedback()) >= 0 and link.buffered == 0)
+        link.stop()
+        report = far.end()
+        received = np.loadtxt(far.record, delimiter=",", skiprows=1)[:, :6]
+    assert report["at_rest"]
+    wanted = np.rint(np.vstack([rows.slider[:first], hold.slider]) / link.resolution)
+    begin = _where(received, wanted[:50])
+    assert (received[begin : begin + len(wanted)] == wanted).all()
+
+
+def _where(received, wanted):
+    """The index from which ``received`` has the rows ``wanted``."""
+    count = len(wanted)
+    return next(k for k in range(len(received) - count + 1) if (received[k : k + count] == wanted).all())
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])

@@ -24,6 +24,7 @@ class Type(IntEnum):
     DISARM = 0x13
     FAULT_RESET = 0x14
     KEEPALIVE = 0x15
+    REVISE = 0x17
     HELLO_ACK = 0x81
     CONFIG_ACK = 0x82
     CLOCK = 0x83

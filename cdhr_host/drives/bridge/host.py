@@ -1,27 +1,27 @@
 """The host's side of the framed link: a MachineLink over a motion bridge that buffers."""
 
 import math
-import secrets
 import struct
-from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Final
 
 import numpy as np
 
+from cdhr_host.drives.base import TAKING, BufferedLink
 from cdhr_host.drives.bridge import messages as m
-from cdhr_host.drives.bridge.frames import Frame, Reader, Type, encoded
+from cdhr_host.drives.bridge.frames import Frame, Type
 from cdhr_host.drives.bridge.line import Line
+from cdhr_host.drives.bridge.session import Session
 from cdhr_host.drives.bridge.stop import stop_rows
-from cdhr_host.drives.buffer import RowBuffer
+from cdhr_host.drives.bridge.window import Pending, Window
+from cdhr_host.drives.buffer import too_late
 from cdhr_host.drives.canopen.scaling import Scaling
-from cdhr_host.drives.checks import check_standing
+from cdhr_host.drives.checks import check_shapes, check_standing
 from cdhr_host.drives.clock import Clock
 from cdhr_host.drives.faults import fault
 from cdhr_host.drives.link import LinkState
-from cdhr_host.drives.rows import joined, no_feedback
-from cdhr_host.drives.timing import CycleTiming
-from cdhr_host.errors import DriveError, Problem
+from cdhr_host.errors import DriveError
 from cdhr_host.profile.schema import Profile
 from cdhr_host.values import Array, Feedback, Setpoints
 
@@ -31,6 +31,10 @@ KEEPALIVE: Final = 0.02
 RETRY: Final = 0.1
 """s without progress after which setpoints are sent again"""
 ANSWER: Final = 2.0
+SPARE: Final = 16
+"""rows beyond the low water that a revision must have before the bridge changes over"""
+GUARD: Final = 0.05
+"""s between asking for a revision and its first tick, besides the time the line needs"""
 STATES: Final = {
     m.State.IDLE: LinkState.STOPPED,
     m.State.PRIMING: LinkState.ARMED,
@@ -40,46 +44,32 @@ STATES: Final = {
 }
 
 
-class BridgeLink:
+class BridgeLink(BufferedLink):
     """MachineLink over a bridge; ``turn`` moves frames and must be called every TURN or so."""
 
     def __init__(self, profile: Profile, clock: Clock, connect: Callable[[], Line]) -> None:
-        self.profile = profile
-        self.state = LinkState.CLOSED
-        self.stop_tick: int | None = None
+        super().__init__(profile, clock.speed)
         self.resolution = profile.canopen.position_unit
         self.due = math.inf
         self.naks = 0
         self._clock, self._connect = clock, connect
         self._scaling = Scaling(profile)
-        self._buffer = RowBuffer(profile, clock.speed)
         self._config = m.config(profile)
-        self._line: Line | None = None
+        self._session: Session | None = None
+        self._period = profile.drives.period
+        self._staged = m.low_water(profile) + SPARE
+        self._number = 0
+        self._status: m.Status | None = None
+        self._status_at = clock.now()
         self._first: int | None = None
-        self._fault: DriveError | None = None
-        self._told = True
-
-    @property
-    def free(self) -> int:
-        """Rows that ``feed`` would accept."""
-        if self.state not in (LinkState.ARMED, LinkState.RUNNING):
-            return 0
-        return self._buffer.free - self.buffered
-
-    @property
-    def buffered(self) -> int:
-        """Rows accepted whose outcome has not come back."""
-        return self._last - self._collected if self._first is not None else 0
+        self._pending: Pending | None = None
+        self._begin_run()
 
     @property
     def slider(self) -> Array:
         """(6,) m, as last told."""
         assert self._status is not None
         return self._scaling.slider(np.array(self._status.position, dtype=np.int64))
-
-    def timing(self) -> CycleTiming | None:
-        """The bridge keeps time."""
-        return None
 
     def stop_rows(self, ahead: Setpoints) -> Setpoints:
         """What the bridge plays instead of ``ahead``."""
@@ -89,13 +79,12 @@ class BridgeLink:
     def open(self) -> None:
         """CLOSED -> OPEN: greet, tell the machine's limits."""
         self._expect(LinkState.CLOSED)
-        self._line = self._connect()
-        self._reader = Reader()
-        self._session, self._seq, self._heard = secrets.randbelow(0xFFFF) + 1, 0, 0
-        self._status: m.Status | None = None
+        line = self._connect()
+        self._session = Session(line, self._clock)
+        self._status = None
+        self._guard = GUARD + self._staged * m.PER_TICK / line.rate
         self._acked = self._greeted = False
-        self._fault, self._told = None, True
-        self._executed: list[Feedback] = []
+        self._forget()
         self._begin_run()
         self.due = self._clock.now()
         try:
@@ -104,8 +93,8 @@ class BridgeLink:
             self._repeat(Type.CONFIG, self._config, lambda: self._acked, "the bridge keeps another config")
             self._until(lambda: self._status is not None, "the bridge says no status")
         except DriveError:
-            self._line.close()
-            self.due = math.inf
+            line.close()
+            self._session, self.due = None, math.inf
             raise
         self.state = LinkState.OPEN
 
@@ -125,35 +114,61 @@ class BridgeLink:
     def feed(self, setpoints: Setpoints) -> int:
         """Take the first rows there is credit for; how many."""
         self._raise_fault()
-        self._expect(LinkState.ARMED, LinkState.RUNNING)
-        torque = self._scaling.feed_forward(np.where(np.isfinite(setpoints.tension), setpoints.tension, 0.0))
-        accepted = self._buffer.feed(setpoints, self.free)
-        if not accepted:
+        self._expect(*TAKING)
+        self._scaling.feed_forward(np.where(np.isfinite(setpoints.tension), setpoints.tension, 0.0))
+        accepted = setpoints[: self._buffer.feed(setpoints)]
+        if not len(accepted):
             return 0
-        rows = self._buffer.take(accepted)
-        counts = self._scaling.counts(rows.slider)
         if self._first is None:
-            self._first = self._collected = self._next = int(rows.tick[0])
-        self._last = int(rows.tick[-1]) + 1
-        for k in range(accepted):
-            self._ticks.append(m.tick(counts[k], torque[k], float(rows.pressure[k])))
-        self._rests = self._buffer.at_rest
+            self._first = self._collected = int(accepted.tick[0])
+            self._window.begin(self._first)
+        self._window.add(self._encoded(accepted), rests=self._buffer.at_rest)
         self._send_setpoints()
-        if self._rests or self.buffered >= m.low_water(self.profile) + m.ramp_ticks(self.profile):
-            self.state = LinkState.RUNNING
-        return accepted
+        self._run_when_primed()
+        return len(accepted)
 
-    def feedback(self) -> Feedback:
-        """What was executed since the last call."""
+    @property
+    def revisable(self) -> int:
+        """First tick that ``revise`` may still replace: later by what it takes to send one."""
+        first = self._buffer.revisable
+        if self._status is not None and self._status.state is m.State.RUN:
+            told = self._clock.now() - self._status_at
+            first = max(first, self._status.tick + math.ceil((told + self._guard) / self._period))
+        return min(first, self._buffer.next_tick)
+
+    def revise(self, rows: Setpoints) -> None:
+        """Replace what is buffered from ``rows.tick[0]`` on, at the bridge and here."""
         self._raise_fault()
-        executed, self._executed = self._executed, []
-        return joined(executed) if executed else no_feedback()
+        self._expect(*TAKING)
+        check_shapes(rows)
+        if len(rows) and int(rows.tick[0]) < self.revisable:
+            raise too_late(int(rows.tick[0]), self.revisable, self._buffer.next_tick)
+        revision = self._buffer.revision(rows)
+        if revision.first == self._buffer.next_tick:
+            self.feed(rows)
+            return
+        staged = min(len(rows), self._staged)
+        self._number = self._number % 255 + 1
+        self._pending = Pending(
+            self._number, revision, self._encoded(rows), staged, revision.rests(self.profile)
+        )
+        self._refused_late = False
+        self._send_revision()
+        self._wait(
+            lambda: self._pending is None or self.state not in TAKING or self._fault is not None, ANSWER
+        )
+        self._raise_fault()
+        if self._refused_late:
+            raise too_late(revision.first, self.revisable, self._buffer.next_tick)
+        if self._pending is not None:
+            self._pending = None
+            raise fault("bridge", f"the bridge does not answer a revision in {ANSWER:g} s")
 
     def stop(self) -> None:
         """Come to rest on the path, air off."""
         if self.state is LinkState.CLOSED:
             self._expect(LinkState.OPEN)
-        if self.state not in (LinkState.ARMED, LinkState.RUNNING):
+        if self.state not in TAKING:
             return
         self._stopping = True
         for _ in range(3):
@@ -162,7 +177,7 @@ class BridgeLink:
         resting = {m.State.STOPPING, m.State.IDLE, m.State.FAULT}
         self._until(lambda: self._status is not None and self._status.state in resting, "no stop")
         if self.state is LinkState.ARMED or self._status is None or self._status.stop_tick is None:
-            self._collected = self._last
+            self._buffer.drop()
             self.state = LinkState.STOPPED
         else:
             self.stop_tick = self._status.stop_tick
@@ -170,7 +185,7 @@ class BridgeLink:
 
     def close(self) -> None:
         """-> CLOSED; what moves is stopped on the path first."""
-        if self._line is None:
+        if self._session is None:
             return
         try:
             self.stop()
@@ -178,50 +193,46 @@ class BridgeLink:
             self._send(Type.DISARM, b"")
         except DriveError as error:
             self._fault = error
-        self._line.close()
-        self._line, self.due = None, math.inf
+        self._session.line.close()
+        self._session, self.due = None, math.inf
         self.state = LinkState.CLOSED
 
     def turn(self) -> None:
         """Read, answer, send what there is credit for."""
-        if self._line is None or self.due == math.inf:
+        if self._session is None or self.due == math.inf:
             return
         self._clock.wait_until(self.due)
         self.poll()
 
     def poll(self) -> None:
         """A turn now, whatever is due."""
-        if self._line is None or self.due == math.inf:
+        if self._session is None or self.due == math.inf:
             return
         self.due = self._clock.now() + TURN
         try:
             self._read()
             self._send_setpoints()
-            if self._clock.now() - self._sent_at >= KEEPALIVE:
+            if self._clock.now() - self._session.sent_at >= KEEPALIVE:
                 now = int(self._clock.now() * 1e3) & 0xFFFFFFFF
                 self._send(Type.KEEPALIVE, m.KEEPALIVE.pack(now, max(self._collected, 0)))
         except DriveError as gone:
-            self._trip(gone)
+            self._note(gone)
             self.state, self.due = LinkState.FAULT, math.inf
 
     def _begin_run(self) -> None:
-        self._first = None
-        self._last = self._collected = self._next = 0
-        self._ticks: deque[bytes] = deque()
-        self._rests = self._stopping = False
-        self._progress = self._sent_at = self._clock.now()
+        self._first, self._pending = None, None
+        self._collected = 0
+        self._window = Window()
+        self._committed = 0
+        self._refused_late = self._stopping = False
+        self._progress = self._clock.now()
         self.stop_tick = None
 
     def _read(self) -> None:
-        assert self._line is not None
-        for frame in self._reader.frames(self._line.read()):
-            if frame.session != self._session:
-                continue
-            self._heard = frame.seq
-            try:
+        assert self._session is not None
+        for frame in self._session.frames():
+            with suppress(struct.error):
                 self._take(frame)
-            except struct.error:
-                self._reader.dropped += 1
 
     def _take(self, frame: Frame) -> None:
         payload = frame.payload
@@ -234,21 +245,22 @@ class BridgeLink:
         elif frame.type == Type.EXECUTED:
             self._take_executed(payload)
         elif frame.type == Type.NAK:
-            self.naks += 1
-            if self._first is not None:
-                self._next = min(max(m.NAK.unpack(payload)[0], self._last - len(self._ticks)), self._last)
+            self._take_nak(*m.NAK.unpack(payload))
         elif frame.type == Type.FAULT:
             code, axis, _, tick, _, *_ = m.FAULT.unpack(payload)
             kind, text = m.FAULTS.get(code, ("bridge", f"the bridge reports fault {code}"))
             where = f" (slider {axis + 1})" if axis < 6 else ""
-            self._trip(fault(kind, f"{text}{where} at tick {tick}"))
+            self._note(fault(kind, f"{text}{where} at tick {tick}"))
 
     def _take_status(self, told: m.Status) -> None:
         self._status = told
-        if self._first is not None and told.expected > self._last - len(self._ticks):
-            for _ in range(min(told.expected - (self._last - len(self._ticks)), len(self._ticks))):
-                self._ticks.popleft()
-            self._next = max(self._next, self._last - len(self._ticks))
+        self._status_at = self._clock.now()
+        if self._pending is not None and told.revision == self._pending.number:
+            self._revised(self._pending)
+        elif self._pending is not None and told.tick > self._pending.revision.first:
+            self._pending, self._refused_late = None, True
+        current = self._first is not None and told.revision == self._committed
+        if current and (self._window.acknowledge(told.expected) or not self._window.unanswered):
             self._progress = self._clock.now()
         if told.stop_tick is not None:
             self.stop_tick = told.stop_tick
@@ -258,7 +270,14 @@ class BridgeLink:
             self.state = LinkState.FAULT
         elif told.state is m.State.IDLE and self.state is LinkState.STOPPING and told.tick <= self._collected:
             self.state = LinkState.FAULT if self._fault else LinkState.STOPPED
-            self._last = self._collected
+            self._buffer.drop()
+
+    def _take_nak(self, expected: int, reason: int, revision: int, _credit: int) -> None:
+        self.naks += 1
+        if reason == m.LATE and self._pending is not None and revision == self._pending.number:
+            self._pending, self._refused_late = None, True
+        elif self._first is not None and self._pending is None and revision == self._committed:
+            self._window.back_to(expected)
 
     def _take_executed(self, payload: bytes) -> None:
         start, count = m.EXECUTED.unpack_from(payload)
@@ -268,6 +287,8 @@ class BridgeLink:
             values = m.EXECUTED_TICK.unpack_from(payload, m.EXECUTED.size + k * m.EXECUTED_TICK.size)
             self._executed.append(self._row(start + k, values))
             self._collected += 1
+            if len(self._buffer):
+                self._buffer.take(1)
 
     def _row(self, tick: int, values: tuple[int, ...]) -> Feedback:
         position = np.array([values[6:12]], dtype=np.int64)
@@ -284,22 +305,47 @@ class BridgeLink:
         """What the bridge has room for, in frames of up to eight ticks."""
         if self._first is None or self._stopping or self._status is None or self._fault is not None:
             return
-        base = self._last - len(self._ticks)
-        if self._next > base and self._clock.now() - self._progress > RETRY:
-            self._next, self._progress = base, self._clock.now()
-        room = base + self._status.capacity - self._status.buffered
-        while self._next < min(self._last, room):
-            count = min(m.PER_FRAME, self._last - self._next, room - self._next)
-            body = b"".join(self._ticks[self._next - base + k] for k in range(count))
-            rests = self._rests and self._next + count == self._last
-            self._send(Type.SETPOINTS, m.SETPOINTS.pack(self._next, count, 6, int(rests), 0) + body)
-            self._next += count
+        overdue = self._clock.now() - self._progress > RETRY
+        if overdue:
+            self._progress = self._clock.now()
+        if self._pending is not None:
+            if overdue:
+                self._send_revision()
+            return
+        if overdue:
+            self._window.back_to(self._window.base)
+        room = self._window.base + self._status.capacity - self._status.buffered
+        for payload in self._window.payloads(room):
+            self._send(Type.SETPOINTS, payload)
+
+    def _send_revision(self) -> None:
+        """All of its frames; the last one has the bridge carry it out."""
+        assert self._pending is not None
+        self._progress = self._clock.now()
+        for payload in self._pending.payloads():
+            self._send(Type.REVISE, payload)
+
+    def _revised(self, done: Pending) -> None:
+        """The bridge has carried the revision out."""
+        self._pending, self._committed = None, done.number
+        self._buffer.replace(done.revision)
+        self._window.replace(
+            done.revision.first + done.staged, done.ticks[done.staged :], rests=self._buffer.at_rest
+        )
+
+    def _run_when_primed(self) -> None:
+        if self._buffer.at_rest or self.buffered >= m.low_water(self.profile) + m.ramp_ticks(self.profile):
+            self.state = LinkState.RUNNING
+
+    def _encoded(self, rows: Setpoints) -> list[bytes]:
+        """Each row as the bridge gets it; raises DriveError for what does not fit the wire."""
+        torque = self._scaling.feed_forward(rows.tension)
+        counts = self._scaling.counts(rows.slider)
+        return [m.tick(counts[k], torque[k], float(rows.pressure[k])) for k in range(len(rows))]
 
     def _send(self, kind: Type, payload: bytes) -> None:
-        assert self._line is not None
-        self._seq = self._seq + 1 & 0xFFFF
-        self._line.write(encoded(Frame(kind, self._seq, self._heard, self._session, payload)))
-        self._sent_at = self._clock.now()
+        assert self._session is not None
+        self._session.send(kind, payload)
 
     def _repeat(self, kind: Type, payload: bytes, done: Callable[[], bool], what: str) -> None:
         """Send until something is so."""
@@ -326,19 +372,3 @@ class BridgeLink:
 
     def _in_state(self, state: m.State) -> Callable[[], bool]:
         return lambda: self._status is not None and self._status.state is state
-
-    def _trip(self, found: DriveError) -> None:
-        if self._fault is None:
-            self._fault, self._told = found, False
-
-    def _expect(self, *states: LinkState) -> None:
-        if self.state is LinkState.FAULT and self._fault is not None:
-            raise self._fault
-        if self.state not in states:
-            wanted = " or ".join(state.value for state in states)
-            raise DriveError(Problem("state", f"the drives are {self.state.value}, not {wanted}"))
-
-    def _raise_fault(self) -> None:
-        if self._fault is not None and not self._told:
-            self._told = True
-            raise self._fault

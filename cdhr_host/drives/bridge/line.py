@@ -11,9 +11,17 @@ from cdhr_host.drives.canopen.port import transport_fault
 PATIENCE = 0.05
 """s the line may take to make room"""
 
+BITS = 10
+"""on the line for a byte, 8N1"""
+
 
 class Line(Protocol):
     """Bytes out and in; raises DriveError of kind ``transport`` once it is gone."""
+
+    @property
+    def rate(self) -> float:
+        """Bytes a second."""
+        ...
 
     def write(self, data: bytes) -> None:
         """Send all."""
@@ -37,6 +45,7 @@ class SerialLine:
         except (OSError, ValueError) as error:
             raise transport_fault(f"cannot open {path}: {error}") from error
         self._fd = self._port.fileno()
+        self.rate = baud / BITS
 
     def write(self, data: bytes) -> None:
         """Send all, waiting for room a little."""

@@ -19,17 +19,20 @@ CONFIG_END: Final = struct.Struct("<HHHHH")
 ARM: Final = struct.Struct("<I6i")
 SETPOINTS: Final = struct.Struct("<IBBBB")
 TICK: Final = struct.Struct("<6i6hHH")
-STATUS: Final = struct.Struct("<IIIHHBBH")
+STATUS: Final = struct.Struct("<IIIHHBBHBx")
 STATUS_AXIS: Final = struct.Struct("<ihhH")
 STATUS_END: Final = struct.Struct("<H4hHHH")
 FAULT: Final = struct.Struct("<HBBII6i")
-NAK: Final = struct.Struct("<IBxH")
+NAK: Final = struct.Struct("<IBBH")
 KEEPALIVE: Final = struct.Struct("<II")
 EXECUTED: Final = struct.Struct("<IB3x")
 EXECUTED_TICK: Final = struct.Struct("<6i6i6hH")
 NO_TICK: Final = 0xFFFFFFFF
 PER_FRAME: Final = 8
+PER_TICK: Final = 43
+"""bytes on the wire for a tick in a frame of eight"""
 ENDS_AT_REST: Final = 1
+LAST_OF_REVISION: Final = 2
 ROLE_HOST: Final = 1
 PRESSURE_UNIT: Final = 0.1 * KPA
 PICOMETRE: Final = 1e-12
@@ -67,7 +70,9 @@ NAKS: Final = {
     5: "overflow",
     6: "session",
     7: "state",
+    8: "late",
 }
+LATE: Final = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,15 +88,16 @@ class Status:
     state: State
     position: tuple[int, ...]
     dropped: int
+    revision: int
 
 
 def status(payload: bytes) -> Status:
     """STATUS; raises struct.error for another length."""
-    tick, expected, stop, buffered, capacity, state, _, _ = STATUS.unpack_from(payload)
+    tick, expected, stop, buffered, capacity, state, _, _, revision = STATUS.unpack_from(payload)
     axes = [STATUS_AXIS.unpack_from(payload, STATUS.size + k * STATUS_AXIS.size)[0] for k in range(6)]
     end = STATUS_END.unpack_from(payload, STATUS.size + 6 * STATUS_AXIS.size)
     stop_tick = None if stop == NO_TICK else stop
-    return Status(tick, expected, stop_tick, buffered, capacity, State(state), tuple(axes), end[5])
+    return Status(tick, expected, stop_tick, buffered, capacity, State(state), tuple(axes), end[5], revision)
 
 
 def ramp_ticks(profile: Profile) -> int:

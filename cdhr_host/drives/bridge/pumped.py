@@ -79,6 +79,17 @@ class PumpedBridge:
         with self._lock:
             return self._link.feed(setpoints)
 
+    @property
+    def revisable(self) -> int:
+        """First tick that ``revise`` may still replace."""
+        with self._lock:
+            return self._link.revisable
+
+    def revise(self, rows: Setpoints) -> None:
+        """Replace what is buffered from ``rows.tick[0]`` on."""
+        with self._lock:
+            self._link.revise(rows)
+
     def feedback(self) -> Feedback:
         """What was executed since the last call."""
         with self._lock:

@@ -1,4 +1,4 @@
-"""What a bridge plays instead of its buffer when it stops: the rule of docs/link.md, section 6."""
+"""What a bridge plays instead of its buffer when it stops: the rule of docs/link.md, section 7."""
 
 import dataclasses
 

@@ -18,13 +18,15 @@ from typing import Any, Final
 import numpy as np
 
 from cdhr_host.drives.address import port_of
+from cdhr_host.drives.buffer import too_late
+from cdhr_host.drives.checks import check_rows
 from cdhr_host.drives.clock import MonotonicClock
 from cdhr_host.drives.cyclic import CyclicLink
 from cdhr_host.drives.faults import fault
 from cdhr_host.drives.link import LinkState
 from cdhr_host.drives.reference import ReferenceStore
 from cdhr_host.drives.sender.ring import FEEDBACK, SETPOINTS, Ring, packed, setpoints, width
-from cdhr_host.errors import DriveError
+from cdhr_host.errors import DriveError, Problem
 from cdhr_host.profile.schema import Profile
 from cdhr_host.values import Feedback, Setpoints
 
@@ -47,6 +49,7 @@ class Word(IntEnum):
     STOP_TICK = 2
     FAULTS = 3
     EXECUTED = 4
+    REVISABLE = 5
 
 
 NOWHERE: Final = -(2**62)
@@ -62,6 +65,7 @@ class Spec:
     store: Path
     rows: str
     results: str
+    revisions: str
     status: str
 
 
@@ -74,6 +78,8 @@ def run(spec: Spec, commands: Connection) -> None:
         sender.loop(real_time)
     finally:
         sender.end()
+        gc.unfreeze()
+        gc.enable()
 
 
 def hurry() -> bool:
@@ -97,6 +103,7 @@ class Sender:
         self._commands = commands
         self._rows = Ring(width(SETPOINTS, Setpoints), CAPACITY, spec.rows)
         self._results = Ring(width(FEEDBACK, Feedback), RESULTS, spec.results)
+        self._revisions = Ring(width(SETPOINTS, Setpoints), CAPACITY, spec.revisions)
         self._memory = SharedMemory(spec.status)
         self._status = np.ndarray((len(Word),), np.int64, self._memory.buf)
         clock = MonotonicClock()
@@ -125,6 +132,7 @@ class Sender:
         self._publish()
         self._rows.close()
         self._results.close()
+        self._revisions.close()
         del self._status
         self._memory.close()
 
@@ -171,6 +179,30 @@ class Sender:
         self._take_rows()
         self._link.stop()
 
+    def _do_revise(self) -> None:
+        """The revision's rows lie in their own ring, complete; the host waits for the answer.
+
+        Nothing else reads or writes the rows meanwhile and no cycle runs: the next one sees
+        either all of the revision or, when it is refused, nothing of it.
+        """
+        revised = setpoints(self._revisions.take(CAPACITY))
+        self._take_rows()
+        first = int(revised.tick[0])
+        kept = max(first - self._link.next_tick, 0)
+        if kept > self._rows.waiting:
+            raise too_late(first, self._link.revisable, self._link.next_tick + self._rows.waiting)
+        at_once = 0 if kept else min(len(revised), self._link.room_from(first))
+        if kept + len(revised) - at_once > self._rows.capacity:
+            raise DriveError(Problem("overflow", f"{len(revised)} rows from tick {first} on do not fit"))
+        if kept:
+            before = setpoints(self._rows.record(kept - 1)).slider[0]
+            check_rows(revised, self._profile, tick=first, before=before, reach=None)
+        else:
+            check_rows(revised, self._profile, tick=first, before=revised.slider[0], reach=None)
+            self._link.revise(revised[:at_once])
+        self._rows.cut(kept)
+        self._rows.write(packed(revised[at_once:], SETPOINTS))
+
     def _do_close(self) -> None:
         self._link.close()
         self._alive = False
@@ -208,5 +240,6 @@ class Sender:
         self._status[Word.STATE] = STATES.index(self._link.state)
         stop = self._link.stop_tick
         self._status[Word.STOP_TICK] = NOWHERE if stop is None else stop
+        self._status[Word.REVISABLE] = self._link.revisable
         self._status[Word.EXECUTED] = self._results.written
         self._status[Word.CYCLES] += 1

@@ -1,5 +1,6 @@
 """The host's side of the sender: a MachineLink that fills a ring."""
 
+import math
 import multiprocessing
 import time
 from multiprocessing.connection import Connection
@@ -10,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from cdhr_host.drives.checks import STANDS_WITHIN, check_rows
+from cdhr_host.drives.checks import STANDS_WITHIN, check_rows, check_shapes
 from cdhr_host.drives.faults import fault
 from cdhr_host.drives.link import LinkState
 from cdhr_host.drives.rows import no_feedback
@@ -24,6 +25,8 @@ from cdhr_host.values import Array, Feedback, Setpoints
 
 SILENCE: Final = 1.0
 """s without a cycle after which a sender counts as dead"""
+GUARD: Final = 0.02
+"""s between asking for a revision and the cycle before which the sender carries it out"""
 ANSWER: Final = 180.0
 """s a command may take; homing takes longest"""
 
@@ -97,9 +100,7 @@ class SenderLink:
     def feed(self, setpoints: Setpoints) -> int:
         """Put the first rows there is room for into the ring; how many."""
         self._look()
-        if self.state not in (LinkState.ARMED, LinkState.RUNNING):
-            self._fault_if_known()
-            raise DriveError(Problem("state", f"the drives are {self.state.value}, not armed or running"))
+        self._expect_moving()
         if not len(setpoints):
             return 0
         reach = STANDS_WITHIN if self._next_tick is None else None
@@ -110,6 +111,32 @@ class SenderLink:
             self._fed += len(accepted)
             self._tail, self._next_tick = accepted.slider[-1], int(accepted.tick[-1]) + 1
         return len(accepted)
+
+    @property
+    def revisable(self) -> int:
+        """First tick that ``revise`` may still replace."""
+        if self._next_tick is None:
+            return 0
+        guard = math.ceil(GUARD / self.profile.drives.period)
+        return min(int(self._status[Word.REVISABLE]) + guard, self._next_tick)
+
+    def revise(self, rows: Setpoints) -> None:
+        """Replace what is buffered from ``rows.tick[0]`` on: the sender does it between two cycles."""
+        self._look()
+        self._expect_moving()
+        if self._next_tick is None:
+            raise DriveError(Problem("state", "there is nothing to revise: no row was fed yet"))
+        if not len(rows):
+            return
+        check_shapes(rows)
+        if len(rows) > CAPACITY:
+            message = f"a revision of {len(rows)} rows does not fit: there is room for {CAPACITY}"
+            raise DriveError(Problem("overflow", message, value=len(rows), limit=CAPACITY))
+        self._revisions.write(packed(rows, SETPOINTS))
+        self._ask("revise")
+        after = int(rows.tick[-1]) + 1
+        self._fed += after - self._next_tick
+        self._tail, self._next_tick = rows.slider[-1], after
 
     def feedback(self) -> Feedback:
         """What was executed since the last call."""
@@ -149,6 +176,7 @@ class SenderLink:
     def _start(self) -> None:
         self._rows = Ring(width(SETPOINTS, Setpoints), CAPACITY)
         self._results = Ring(width(FEEDBACK, Feedback), RESULTS)
+        self._revisions = Ring(width(SETPOINTS, Setpoints), CAPACITY)
         self._memory = SharedMemory(create=True, size=8 * len(Word))
         self._status = np.ndarray((len(Word),), np.int64, self._memory.buf)
         self._status[:] = 0
@@ -156,9 +184,8 @@ class SenderLink:
         context = multiprocessing.get_context("spawn")
         self._pipe: Connection
         self._pipe, far = context.Pipe()
-        spec = Spec(
-            self._url, self.profile, self._store, self._rows.name, self._results.name, self._memory.name
-        )
+        rings = (self._rows.name, self._results.name, self._revisions.name)
+        spec = Spec(self._url, self.profile, self._store, *rings, self._memory.name)
         self._process = context.Process(target=run, args=(spec, far), name="cdhr-sender")
         self._process.start()
         far.close()
@@ -179,6 +206,7 @@ class SenderLink:
         self._memory.unlink()
         self._rows.close()
         self._results.close()
+        self._revisions.close()
         self.state = LinkState.CLOSED
 
     def _ask(self, name: str, *arguments: Any) -> Any:
@@ -232,6 +260,11 @@ class SenderLink:
             self._fault = fault("sender", f"the sending process {how}")
         self.state = LinkState.FAULT
         return self._fault
+
+    def _expect_moving(self) -> None:
+        if self.state not in (LinkState.ARMED, LinkState.RUNNING):
+            self._fault_if_known()
+            raise DriveError(Problem("state", f"the drives are {self.state.value}, not armed or running"))
 
     def _fault_if_known(self) -> None:
         if self._fault is not None and self.state is LinkState.FAULT:

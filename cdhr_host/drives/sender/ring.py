@@ -64,6 +64,19 @@ class Ring:
         self._counters[1] = at + count
         return records
 
+    @property
+    def waiting(self) -> int:
+        """Records written and not taken."""
+        return self.written - int(self._counters[1])
+
+    def record(self, k: int) -> Array:
+        """(1, width), the ``k``-th of the waiting records."""
+        return self._records[[(int(self._counters[1]) + k) % self.capacity]]
+
+    def cut(self, count: int) -> None:
+        """Forget all waiting records but the first ``count``; only while the writer stands still."""
+        self._counters[0] = int(self._counters[1]) + count
+
     def close(self) -> None:
         """Give the memory back; the owner's ``close`` removes it."""
         del self._counters, self._records

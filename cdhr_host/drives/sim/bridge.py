@@ -10,22 +10,20 @@ from typing import Final
 import numpy as np
 
 from cdhr_host.drives.sim.framing import cobs, plain
+from cdhr_host.drives.sim.store import CAPACITY, Code, Limits, Nak, Refused, Store, Violated
 from cdhr_host.plant import Disturbance, Machine, undisturbed
 from cdhr_host.profile.schema import Profile
 from cdhr_host.units import KPA
 from cdhr_host.values import Array, Setpoints
 
-CAPACITY: Final = 1024
 STATUS_EVERY: Final = 0.02
 FAULT_EVERY: Final = 0.1
 RESEND: Final = 0.1
 """s after which executed ticks that the host did not take are sent again"""
-BATCH: Final = 8
-ONE: Final = 65536
 
 
 class State(IntEnum):
-    """docs/link.md section 5."""
+    """docs/link.md section 6."""
 
     BOOT = 0
     IDLE = 1
@@ -35,18 +33,7 @@ class State(IntEnum):
     FAULT = 7
 
 
-class Code(IntEnum):
-    """Fault codes."""
-
-    NONE = 0
-    LINK_LOST = 1
-    UNDERRUN = 2
-    RANGE = 3
-    STEP = 4
-    OVERLAP = 5
-    FOLLOWING = 6
-    PRESSURE = 8
-    EMERGENCY_STOP = 9
+TAKING: Final = (State.PRIMING, State.RUN)
 
 
 class Bridge:
@@ -106,15 +93,9 @@ class Bridge:
 
     def _reset(self, start: tuple[int, ...]) -> None:
         """Nothing buffered, standing at ``start``."""
-        self._ticks: deque[tuple[int, ...]] = deque()
-        self._last: list[tuple[int, ...]] = [start, start]
-        self._stop: deque[tuple[int, ...]] = deque()
+        self.store = Store(start)
         self._executed: deque[tuple[int, ...]] = deque()
         self._first_kept = self._next_sent = 0
-        self._expected: int | None = None
-        self._tick = 0
-        self._rests = True
-        self._stop_tick: int | None = None
         self._due: float | None = None
         self._air = 0
 
@@ -137,16 +118,21 @@ class Bridge:
             0x12: self._stop_now,
             0x13: self._disarm,
             0x15: lambda: self._keepalive(payload),
+            0x17: lambda: self._revise(payload),
         }.get(kind)
-        if handler is None:
-            self._nak(7)
-        else:
+        try:
+            if handler is None:
+                raise Refused(Nak.STATE)
             handler()
+        except Refused as refused:
+            self.gaps += refused.reason is Nak.GAP
+            self._nak(refused)
+        except Violated as found:
+            self._trip(found.code, found.axis)
 
     def _hello(self, session: int) -> None:
         if self.state in (State.RUN, State.STOPPING):
-            self._nak(7)
-            return
+            raise Refused(Nak.STATE)
         self._session, self.code, self._told = session, Code.NONE, True
         self.state = State.IDLE
         self._reset(self._position)
@@ -159,10 +145,7 @@ class Bridge:
 
     def _configure(self, payload: bytes) -> None:
         self._config = payload
-        _, self._picometres = struct.unpack_from("<Ii", payload)
-        self._axes = [struct.unpack_from("<iiIIHbx", payload, 8 + 20 * k) for k in range(6)]
-        watchdog, self._low, self._ramp, self._most, _ = struct.unpack_from("<HHHHH", payload, 128)
-        self._watchdog = watchdog * 1e-3
+        self._limits = Limits(payload)
         self._say(0x82, struct.pack("<I", zlib.crc32(payload)))
 
     def _arm(self, payload: bytes) -> None:
@@ -170,8 +153,7 @@ class Bridge:
         near = all(abs(a - b) <= 600 for a, b in zip(start, self._position, strict=True))
         armable = self.state in (State.IDLE, State.PRIMING) and not self.estop
         if self._config is None or crc != zlib.crc32(self._config) or not near or not armable:
-            self._nak(7)
-            return
+            raise Refused(Nak.STATE)
         if self.state is State.IDLE:
             self._reset(tuple(start))
             told = np.array(start) * self._unit
@@ -190,56 +172,26 @@ class Bridge:
             self._sent_at = self._now
 
     def _take(self, payload: bytes) -> None:
-        """SETPOINTS: all of a frame or none of it."""
-        start, count, _, flags, _ = struct.unpack_from("<IBBBB", payload)
-        if self.state not in (State.PRIMING, State.RUN):
-            self._nak(7)
-            return
-        if len(payload) != 8 + 40 * count or not 1 <= count <= BATCH:
-            self._nak(3)
-            return
-        ticks = [struct.unpack_from("<6i6hHH", payload, 8 + 40 * k) for k in range(count)]
-        if self._expected is None:
-            self._expected = self._tick = self._first_kept = self._next_sent = start
-        if start != self._expected:
-            self._out_of_order(start, ticks)
-            return
-        if len(self._ticks) + count > CAPACITY:
-            self._nak(5)
-            return
-        for tick in ticks:
-            if found := self._violation(tick):
-                self._trip(*found)
-                return
-            self._ticks.append(tick)
-            self._last = [self._last[1], tick[:6]]
-        self._expected += count
-        self._rests = bool(flags & 1)
-        if self._rests or len(self._ticks) >= self._low + self._ramp:
+        """SETPOINTS."""
+        if self.state not in TAKING:
+            raise Refused(Nak.STATE)
+        fresh = self.store.expected is None
+        self.store.take(payload, self._limits)
+        if fresh:
+            self._first_kept = self._next_sent = self.store.tick
+        self._go_when_primed()
+
+    def _revise(self, payload: bytes) -> None:
+        """REVISE; once it is carried out STATUS says so."""
+        if self.state not in TAKING:
+            raise Refused(Nak.STATE)
+        if self.store.revise(payload, self._limits):
+            self._status_at = -STATUS_EVERY
+            self._go_when_primed()
+
+    def _go_when_primed(self) -> None:
+        if self.store.rests or len(self.store.ticks) >= self._limits.low + self._limits.ramp:
             self._go()
-
-    def _out_of_order(self, start: int, ticks: list[tuple[int, ...]]) -> None:
-        """A gap is refused, a repetition ignored, another content is a fault."""
-        assert self._expected is not None
-        if start > self._expected:
-            self.gaps += 1
-            self._nak(2)
-            return
-        for k, tick in enumerate(ticks):
-            at = start + k - self._tick
-            if 0 <= at < len(self._ticks) and self._ticks[at] != tick:
-                self._trip(Code.OVERLAP, 255)
-                return
-
-    def _violation(self, tick: tuple[int, ...]) -> tuple[Code, int] | None:
-        before, last = self._last
-        for axis, (low, high, step, change, _, _) in enumerate(self._axes):
-            at = tick[axis]
-            if not low <= at <= high:
-                return Code.RANGE, axis
-            if abs(at - last[axis]) > step or abs(at - 2 * last[axis] + before[axis]) > change + step // 50:
-                return Code.STEP, axis
-        return (Code.PRESSURE, 255) if tick[12] > self._most else None
 
     def _go(self) -> None:
         if self.state is State.PRIMING or self._due is None:
@@ -248,7 +200,7 @@ class Bridge:
 
     def _run(self, now: float) -> None:
         """Execute the ticks that are due; watch the link."""
-        if self.state in (State.PRIMING, State.RUN) and now - self._heard > self._watchdog:
+        if self.state in (State.PRIMING, State.RUN) and now - self._heard > self._limits.watchdog:
             self._trip(Code.LINK_LOST, 255)
         if self.estop and self.state in (State.PRIMING, State.RUN):
             self._trip(Code.EMERGENCY_STOP, 255)
@@ -258,20 +210,20 @@ class Bridge:
 
     def _step(self) -> None:
         if self.state is State.STOPPING:
-            if self._stop:
-                self._execute(self._stop.popleft())
+            if self.store.stop:
+                self._execute(self.store.stop.popleft())
             else:
                 self._due, self.state = None, State.FAULT if self.code else State.IDLE
-                self._ticks.clear()
+                self.store.ticks.clear()
             return
-        if not self._ticks:
+        if not self.store.ticks:
             self._due = None
             return
-        if not self._rests and len(self._ticks) <= self._low:
+        if not self.store.rests and len(self.store.ticks) <= self._limits.low:
             self._trip(Code.UNDERRUN, 255)
             self._step()
             return
-        self._execute(self._ticks.popleft())
+        self._execute(self.store.ticks.popleft())
 
     def _execute(self, tick: tuple[int, ...]) -> None:
         self._air = tick[12]
@@ -286,47 +238,36 @@ class Bridge:
         self._pressure = round(feedback.pressure[0] / (0.1 * KPA))
         self._executed.append((*tick[:6], *self._position, *self._torque, self._pressure))
         self.received.append((*tick[:6], tick[12]))
-        self._tick += 1
+        self.store.tick += 1
         away = [abs(a - b) for a, b in zip(self._position, tick[:6], strict=True)]
         if max(away) * self._unit > self.profile.drives.following_error_max and not self.code:
             self._trip(Code.FOLLOWING, away.index(max(away)))
 
     def _row(self, slider: Array, tension: Array) -> Setpoints:
         zero = np.zeros((1, 3))
-        tick = np.array([self._tick])
+        tick = np.array([self.store.tick])
         pressure = np.array([self._air * 0.1 * KPA])
         return Setpoints(
             tick, tick * 1.0, tick * 0, zero, zero.copy(), slider, tension, np.zeros(1), pressure
         )
 
     def _stop_now(self) -> None:
-        if self.state is State.PRIMING or (self.state is State.RUN and not self._ticks):
+        if self.state is State.PRIMING or (self.state is State.RUN and not self.store.ticks):
             self.state = State.IDLE
-            self._ticks.clear()
+            self.store.ticks.clear()
         elif self.state is State.RUN:
             self._begin_stop()
 
     def _begin_stop(self) -> None:
-        """Time-scaled: rate 1 - 3 z² + 2 z³ over ``ramp`` ticks along what is stored, section 6."""
-        self.state, self._stop_tick = State.STOPPING, self._tick
-        stored, time = list(self._ticks), 0
-        for step in range(self._ramp + 1):
-            if step:
-                z = step * ONE // self._ramp
-                squared = z * z >> 16
-                time += ONE - 3 * squared + 2 * (squared * z >> 16)
-            time = min(time, (len(stored) - 1) * ONE)
-            first, share = time >> 16, time & (ONE - 1)
-            a, b = stored[first], stored[min(first + 1, len(stored) - 1)]
-            at = [a[k] + ((b[k] - a[k]) * share >> 16) for k in range(6)]
-            self._stop.append((*at, *a[6:12], 0, 0))
+        self.state = State.STOPPING
+        self.store.begin_stop(self._limits.ramp)
 
     def _trip(self, code: Code, axis: int) -> None:
         if self.code:
             return
         self.code, self._axis, self._told = code, axis, False
         self._fault_at = self._now - FAULT_EVERY
-        if self.state is State.RUN and self._ticks:
+        if self.state is State.RUN and self.store.ticks:
             self._begin_stop()
         elif self.state is not State.STOPPING:
             self.state, self._due = State.FAULT, None
@@ -343,7 +284,9 @@ class Bridge:
             self._say(0x91, self._status())
         if self.code and now - self._fault_at >= FAULT_EVERY:
             self._fault_at = now
-            self._say(0x92, struct.pack("<HBBII6i", self.code, self._axis, 1, self._tick, 0, *self._position))
+            self._say(
+                0x92, struct.pack("<HBBII6i", self.code, self._axis, 1, self.store.tick, 0, *self._position)
+            )
 
     def _say_executed(self) -> None:
         while (skip := self._next_sent - self._first_kept) < len(self._executed):
@@ -355,15 +298,16 @@ class Bridge:
     def _status(self) -> bytes:
         none = 0xFFFFFFFF
         head = struct.pack(
-            "<IIIHHBBH",
-            self._tick,
-            self._tick if self._expected is None else self._expected,
-            none if self._stop_tick is None else self._stop_tick,
-            len(self._ticks),
+            "<IIIHHBBHBx",
+            self.store.tick,
+            self.store.tick if self.store.expected is None else self.store.expected,
+            none if self.store.stop_tick is None else self.store.stop_tick,
+            len(self.store.ticks),
             CAPACITY,
             self.state,
             int(not self.estop),
             1000,
+            self.store.revision,
         )
         axes = b"".join(
             struct.pack("<ihhH", at, 0, torque, 0x1237)
@@ -372,9 +316,10 @@ class Bridge:
         counters = (self.dropped & 0xFFFF, self.gaps & 0xFFFF)
         return head + axes + struct.pack("<H4hHHH", self._pressure, 0, 0, 0, 0, *counters, self.late)
 
-    def _nak(self, reason: int) -> None:
-        expected = self._tick if self._expected is None else self._expected
-        self._say(0x94, struct.pack("<IBxH", expected, reason, CAPACITY - len(self._ticks)))
+    def _nak(self, refused: Refused) -> None:
+        expected = self.store.tick if self.store.expected is None else self.store.expected
+        number = self.store.revision if refused.revision is None else refused.revision
+        self._say(0x94, struct.pack("<IBBH", expected, refused.reason, number, self.store.credit))
 
     def _say(self, kind: int, payload: bytes) -> None:
         self._seq = self._seq + 1 & 0xFFFF

@@ -114,6 +114,7 @@ def serve(terminal: Terminal, far: Serial, stopped: Callable[[], bool]) -> None:
         answer = far.exchange(time.monotonic(), data)
         if answer:
             terminal.write(answer)
+    gc.unfreeze()
 
 
 def keep_record(far: Serial, path: Path) -> None:
