@@ -7,7 +7,7 @@ import typer
 
 from cdhr_host.cli.interrupt import StopRequest
 from cdhr_host.cli.machine import SIMULATED, open_machine, opened
-from cdhr_host.cli.options import DrivesUrl, ProfileName, examples
+from cdhr_host.cli.options import DrivesUrl, MaterialName, ProfileName, examples
 from cdhr_host.cli.refusals import emit
 
 EXAMPLES = examples(
@@ -20,6 +20,7 @@ EXAMPLES = examples(
 def jog(
     *,
     profile: ProfileName = "paper",
+    material: MaterialName = None,
     drives: DrivesUrl = SIMULATED,
     speed: Annotated[
         float, typer.Option(metavar="X", help="Run the simulated drives X times faster.", min=0.01)
@@ -33,7 +34,7 @@ def jog(
     from cdhr_host.console import Session, from_keys, from_lines
     from cdhr_host.pipeline import Staircase
 
-    machine = open_machine(profile)
+    machine = open_machine(profile, material)
     link, clock = opened(drives, machine, speed)
     try:
         session = Session(Staircase(machine), link, clock, stops=StopRequest)

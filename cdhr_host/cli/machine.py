@@ -12,12 +12,12 @@ if TYPE_CHECKING:
 SIMULATED = "loopback:"
 
 
-def open_machine(profile: str) -> "Profile":
-    """The profile; its refusals name it."""
+def open_machine(profile: str, material: str | None = None) -> "Profile":
+    """The profile, with this clay if one is named; its refusals name it."""
     from cdhr_host.pipeline import open_profile
 
     with about(profile):
-        return open_profile(profile)
+        return open_profile(profile, material)
 
 
 def opened(drives: str, machine: "Profile", speed: float) -> "tuple[MachineLink, Clock]":

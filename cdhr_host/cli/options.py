@@ -18,6 +18,12 @@ ProfileName = Annotated[
         "--profile", "-p", metavar="P", help="Name of an installed profile, or the path of a .toml file."
     ),
 ]
+MaterialName = Annotated[
+    str | None,
+    typer.Option(
+        "--material", metavar="M", help="The clay: an installed material (cdhr profile list), or a path."
+    ),
+]
 DrivesUrl = Annotated[
     str,
     typer.Option("--drives", metavar="URL", help="Where the drives are; loopback: simulates them here."),

@@ -5,47 +5,55 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cdhr_host.cli.options import Json, examples
+from cdhr_host.cli.options import Json, MaterialName, examples
 from cdhr_host.cli.refusals import Refusal, about, emit
 
 if TYPE_CHECKING:
-    from cdhr_host.profile import Profile
+    from cdhr_host.profile import MaterialFile, Profile
 
 app = typer.Typer(
-    help="List, show and check machine profiles.",
+    help="List, show and check machine and material profiles.",
     epilog=examples(
         "cdhr profile list",
         "cdhr profile show paper > mine.toml",
+        "cdhr profile show stoneware > my-clay.toml",
         "cdhr profile check mine.toml",
     ),
     no_args_is_help=True,
 )
-Name = Annotated[str, typer.Argument(metavar="P", help="Name of an installed profile, or a path.")]
+Name = Annotated[
+    str, typer.Argument(metavar="P", help="Name of an installed machine or material profile, or a path.")
+]
 
 
 @app.command("list", epilog=examples("cdhr profile list", "cdhr profile list --json"))
 def list_(json_: Json = False) -> None:
-    """The installed profiles."""
+    """The installed profiles: machines, then materials."""
     from cdhr_host.pipeline import open_profile
-    from cdhr_host.profile import profile_names
+    from cdhr_host.profile import material_names, profile_names, read_material
 
-    rows = [(name, open_profile(name).machine, path) for name, path in sorted(profile_names().items())]
+    machines = [(name, open_profile(name).machine, path) for name, path in sorted(profile_names().items())]
+    clays = [(name, read_material(name).clay, path) for name, path in sorted(material_names().items())]
     if json_:
-        found = [{"name": n, "machine": m.name, "source": m.source, "path": str(p)} for n, m, p in rows]
-        emit(json.dumps({"profiles": found}))
+        found = [{"name": n, "machine": m.name, "source": m.source, "path": str(p)} for n, m, p in machines]
+        pastes = [
+            {"name": n, "clay": c.name, "source": c.source, "example": c.example, "path": str(p)}
+            for n, c, p in clays
+        ]
+        emit(json.dumps({"profiles": found, "materials": pastes}))
         return
+    rows = [(name, machine.name, path) for name, machine, path in machines]
+    rows += [(name, f"{clay.name}{' (an example)' * clay.example}", path) for name, clay, path in clays]
     width = max(len(name) for name, _, _ in rows)
-    for name, machine, path in rows:
-        emit(f"{name:<{width}}  {machine.name}\n{'':<{width}}  {path}")
+    for name, title, path in rows:
+        emit(f"{name:<{width}}  {title}\n{'':<{width}}  {path}")
 
 
 @app.command(epilog=examples("cdhr profile show paper", "cdhr profile show paper > mine.toml"))
-def show(name: Name = "paper", json_: Json = False) -> None:
+def show(name: Name = "paper", material: MaterialName = None, json_: Json = False) -> None:
     """Every value of a profile with its unit: a valid profile in itself."""
-    from cdhr_host.pipeline import open_profile
-
     with about(name):
-        sections = _sections(open_profile(name))
+        sections = _sections(_opened(name, material))
     if json_:
         emit(json.dumps({part: {key: value for key, value, _ in rows} for part, rows in sections.items()}))
         return
@@ -65,18 +73,15 @@ def check(
     ] = None,
 ) -> None:
     """Read profiles and list everything wrong with them; exit code 3 when there is anything."""
-    from cdhr_host.drives.canopen.load import bus_share
     from cdhr_host.errors import ProfileError
-    from cdhr_host.pipeline import open_profile
-    from cdhr_host.profile import profile_names
+    from cdhr_host.profile import material_names, profile_names
 
     refusals = []
-    for name in names or profile_names():
+    for name in names or [*profile_names(), *material_names()]:
         try:
             with about(name):
-                profile = open_profile(name)
-                load = bus_share(profile)
-            emit(f"{name}: ok: {profile.machine.name}; CAN bus {load:.0%} full at worst")
+                verdict = _verdict(_opened(name))
+            emit(f"{name}: ok: {verdict}")
         except Refusal as refusal:
             refusals.append(str(refusal))
     if refusals:
@@ -90,7 +95,27 @@ def _toml(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
-def _sections(profile: "Profile") -> dict[str, list[tuple[str, Any, str]]]:
+def _opened(name: str, material: str | None = None) -> "Profile | MaterialFile":
+    """A machine or a material, whichever the name or the file is."""
+    from cdhr_host.pipeline import open_profile
+    from cdhr_host.profile import is_material, read_material
+
+    if material is None and is_material(name):
+        return read_material(name)
+    return open_profile(name, material)
+
+
+def _verdict(profile: "Profile | MaterialFile") -> str:
+    """What a sound profile is."""
+    from cdhr_host.drives.canopen.load import bus_share
+    from cdhr_host.profile import MaterialFile
+
+    if isinstance(profile, MaterialFile):
+        return profile.clay.name
+    return f"{profile.machine.name}; CAN bus {bus_share(profile):.0%} full at worst"
+
+
+def _sections(profile: "Profile | MaterialFile") -> dict[str, list[tuple[str, Any, str]]]:
     """Section -> (key with unit, value in that unit, description)."""
     from cdhr_host.profile import described
 

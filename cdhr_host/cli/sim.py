@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from cdhr_host.cli.machine import open_machine
-from cdhr_host.cli.options import ProfileName, examples
+from cdhr_host.cli.options import MaterialName, ProfileName, examples
 from cdhr_host.cli.refusals import emit, writing
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ EXAMPLES = examples(
 def sim(
     *,
     profile: ProfileName = "paper",
+    material: MaterialName = None,
     bus: Annotated[
         Literal["slcan", "link"],
         typer.Option(help="CANopen drives behind a serial CAN adapter, or a motion bridge."),
@@ -40,7 +41,7 @@ def sim(
     """Be six drives, a pressure regulator and the machine behind them, until interrupted."""
     from cdhr_host.drives.sim.serve import Terminal, keep_record, serve
 
-    machine = open_machine(profile)
+    machine = open_machine(profile, material)
     stopped: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda n, _: stopped.append(n))

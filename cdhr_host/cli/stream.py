@@ -9,7 +9,7 @@ import typer
 
 from cdhr_host.cli.interrupt import StopRequest
 from cdhr_host.cli.machine import SIMULATED, check_log, open_machine, opened
-from cdhr_host.cli.options import DrivesUrl, Json, LogPath, ProfileName, Program, examples
+from cdhr_host.cli.options import DrivesUrl, Json, LogPath, MaterialName, ProfileName, Program, examples
 from cdhr_host.cli.printing import Run, printed
 from cdhr_host.cli.proving import proven, tell_problems
 from cdhr_host.cli.refusals import INTERRUPTED, Refusal, about, emit
@@ -41,6 +41,7 @@ def stream(
     file: Program,
     *,
     profile: ProfileName = "paper",
+    material: MaterialName = None,
     drives: DrivesUrl = SIMULATED,
     speed: Annotated[
         float,
@@ -65,7 +66,7 @@ def stream(
             "cdhr: error: a print needs a file\nhint: it is read twice, to prove it and to print it"
         )
     source = Source(file)
-    machine = open_machine(profile)
+    machine = open_machine(profile, material)
     check_log(log)
     loop = _loop(control, machine, drives)
     link, clock = opened(drives, machine, speed)

@@ -6,6 +6,7 @@ from cdhr_host.profile.load import described, find, profile_names, read_table, v
 from cdhr_host.profile.materials import (
     MaterialFile,
     find_material,
+    is_material,
     material_folder,
     material_names,
     read_material,
@@ -33,6 +34,7 @@ __all__ = [
     "described",
     "find",
     "find_material",
+    "is_material",
     "material_folder",
     "material_names",
     "profile_names",

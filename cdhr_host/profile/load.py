@@ -154,9 +154,9 @@ def _meaning(loc: tuple[int | str, ...], model: type[BaseModel]) -> str | None:
     return f"{loc[1]}: {text}" if text else None
 
 
-def described(profile: Profile) -> Iterator[tuple[str, str, float | int | str, str]]:
-    """Rows (section, key with unit, value in that unit, description) of a profile."""
-    for section in Profile.model_fields:
+def described(profile: BaseModel) -> Iterator[tuple[str, str, float | int | str, str]]:
+    """Rows (section, key with unit, value in that unit, description) of a machine or a material."""
+    for section in type(profile).model_fields:
         values = getattr(profile, section)
         for name, info in type(values).model_fields.items():
             shown = info.alias or name

@@ -33,13 +33,21 @@ def find_material(name_or_path: str) -> Path:
     return find_among(material_names(), name_or_path, "material")
 
 
-def read_material(name_or_path: str) -> Clay:
-    """A clay by name or path; raises ProfileError with every problem of its file at once."""
+def is_material(name_or_path: str) -> bool:
+    """Whether this names a material, or a file that has a clay and no machine."""
+    if name_or_path in material_names():
+        return True
+    path = Path(name_or_path)
+    return path.is_file() and "clay" in (table := read_table(path)) and "machine" not in table
+
+
+def read_material(name_or_path: str) -> MaterialFile:
+    """A material by name or path; raises ProfileError with every problem of its file at once."""
     table = read_table(find_material(name_or_path))
     problems = _problems(table)
     if problems:
         raise ProfileError(problems)
-    return MaterialFile.model_validate(table).clay
+    return MaterialFile.model_validate(table)
 
 
 def with_material(table: dict[str, Any], material: str | None = None) -> tuple[dict[str, Any], list[Problem]]:

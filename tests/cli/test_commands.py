@@ -147,14 +147,28 @@ def test_a_file_that_is_none_is_exit_code_2(tmp_path: Path, file: str, words: st
     assert words in result.stderr
 
 
+CLAYS = ["earthenware", "porcelain", "stoneware"]
+
+
 def test_profiles_are_listed() -> None:
     assert [line.split()[0] for line in cdhr("profile", "list").stdout.splitlines()[::2]] == [
         "paper",
         "paper-simulation",
         "paper-wide",
+        *CLAYS,
     ]
-    names = [row["name"] for row in json.loads(cdhr("profile", "list", "--json").stdout)["profiles"]]
-    assert names == ["paper", "paper-simulation", "paper-wide"]
+    found = json.loads(cdhr("profile", "list", "--json").stdout)
+    assert [row["name"] for row in found["profiles"]] == ["paper", "paper-simulation", "paper-wide"]
+    assert [row["name"] for row in found["materials"] if row["example"]] == CLAYS
+
+
+def test_a_shown_material_is_a_material(tmp_path: Path) -> None:
+    mine = tmp_path / "mine.toml"
+    mine.write_text(cdhr("profile", "show", "stoneware").stdout)
+    assert cdhr("profile", "check", str(mine)).stdout.startswith(f"{mine}: ok: stoneware")
+    shown = json.loads(cdhr("profile", "show", "paper", "--material", str(mine), "--json").stdout)
+    assert shown["clay"]["yield_stress_pa"] == 2000
+    assert cdhr("profile", "show", "paper", "--material", "stonewear").exit_code == 3
 
 
 def test_a_shown_profile_is_a_profile(tmp_path: Path) -> None:
@@ -197,7 +211,7 @@ def test_an_unknown_profile_is_exit_code_3(command: list[str]) -> None:
 def test_all_installed_profiles_are_sound() -> None:
     result = cdhr("profile", "check")
     assert result.exit_code == 0
-    assert result.stdout.count(": ok") == 3
+    assert result.stdout.count(": ok") == 3 + len(CLAYS)
 
 
 def test_compensation_shows_what_the_paper_is_about() -> None:

@@ -9,6 +9,7 @@ from looking import ROOT
 
 PROGRAMS = sorted(path for path in (ROOT / "gcode").iterdir() if path.is_file())
 PROFILES = sorted((ROOT / "profiles").glob("*.toml"))
+MATERIALS = sorted((ROOT / "profiles" / "materials").glob("*.toml"))
 
 
 def test_programs_are_data_only() -> None:
@@ -25,7 +26,7 @@ def test_first_line_of_a_program_says_what_it_is(path: Path) -> None:
     assert len(first.strip(b"; \r\n")) > 10
 
 
-@pytest.mark.parametrize("path", PROFILES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", PROFILES + MATERIALS, ids=lambda path: path.stem)
 def test_every_key_of_a_profile_has_a_comment(path: Path) -> None:
     plain = {"name", "source"}
     bare = [

@@ -2,11 +2,22 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from cdhr_host.errors import ProfileError
+from cdhr_host.extrusion import flow_law
 from cdhr_host.pipeline import check_profile, open_profile
-from cdhr_host.profile import Clay, described, find, find_material, read_material, read_table, with_material
+from cdhr_host.profile import (
+    Clay,
+    described,
+    find,
+    find_material,
+    material_names,
+    read_material,
+    read_table,
+    with_material,
+)
 
 KEYS = [info.alias or name for name, info in Clay.model_fields.items()]
 SOFT = {
@@ -83,7 +94,7 @@ def test_every_problem_of_a_material_at_once(material):
 
 
 def test_material_file_alone_is_read_as_strictly(material):
-    assert read_material(material()).name == "soft"
+    assert read_material(material()).clay.name == "soft"
     with pytest.raises(ProfileError, match=r"clay\.index = 9\.0"):
         read_material(material(index=9.0))
 
@@ -115,8 +126,32 @@ def test_two_sources_of_the_clay_are_refused(material):
 
 
 def test_clay_that_the_air_cannot_push_is_refused(material):
-    _, problems = check_profile("paper", material(yield_stress_pa=2000.0))
+    _, problems = check_profile("paper", material(yield_stress_pa=8000.0))
     (problem,) = problems
-    threshold = 4 * 2000 * (20 / 5 + 500 / 20) / 1000
+    threshold = 4 * 8000 * (20 / 5 + 150 / 40) / 1000
     assert f"above {threshold:g} kPa" in problem.message
-    assert problem.limit == pytest.approx(2000 * 200 / threshold)
+    assert problem.limit == pytest.approx(8000 * 200 / threshold)
+
+
+@pytest.mark.parametrize("name", material_names())
+def test_installed_materials_are_sound_and_can_be_pushed(name):
+    """A 5 mm bead at 20 mm/s, 250 mm³/s, within the 0.2 MPa of the paper."""
+    profile = open_profile("paper", name)
+    law = flow_law(profile.extruder, profile.clay)
+    assert law.threshold < law.pressure(np.array(250e-9)) < 0.85 * profile.extruder.pressure_max
+    assert profile.clay.source
+
+
+def test_examples_say_so():
+    assert set(material_names()) >= {"earthenware", "porcelain", "stoneware"}
+    for path in material_names().values():
+        clay = read_material(str(path)).clay
+        assert clay.example == path.read_text().startswith("# An example, not your clay")
+
+
+def test_earthenware_follows_its_published_viscosities():
+    clay = read_material("earthenware").clay
+    for rpm, viscosity in ((1, 828.0), (5, 202.4), (50, 40.4)):
+        rate = 0.25 * rpm
+        stress = clay.yield_stress + clay.consistency * rate**clay.index
+        assert stress / rate == pytest.approx(viscosity, rel=0.01)
