@@ -3,7 +3,7 @@
 import numpy as np
 
 from cdhr_host.pipeline.columns import AXES, SETPOINT_COLUMNS, Column, setpoint_columns, spread
-from cdhr_host.units import KPA, MM
+from cdhr_host.units import KPA, MM, MM3
 from cdhr_host.values import Feedback, Setpoints
 
 __all__ = ["FEEDBACK_COLUMNS", "SETPOINT_COLUMNS", "Column", "run_columns", "setpoint_columns"]
@@ -14,8 +14,10 @@ FEEDBACK_COLUMNS: tuple[str, ...] = (
     *(f"slider{i}_counts" for i in AXES),
     *(f"torque{i}_nm" for i in AXES),
     "pressure_actual_kpa",
+    "deposited_mm3_s",
 )
-"""A run's log goes on with these: what came back, and setpoint minus measured slider."""
+"""A run's log goes on with these: what came back, setpoint minus measured slider, and the clay that
+left the nozzle, NaN where the far side does not simulate it."""
 
 
 def run_columns(setpoints: Setpoints, feedback: Feedback) -> dict[str, Column]:
@@ -29,4 +31,7 @@ def run_columns(setpoints: Setpoints, feedback: Feedback) -> dict[str, Column]:
         **spread("slider{}_counts", feedback.counts),
         **spread("torque{}_nm", feedback.torque),
         "pressure_actual_kpa": feedback.pressure / KPA,
+        "deposited_mm3_s": feedback.deposited / MM3
+        if len(feedback.deposited)
+        else np.full(len(feedback), np.nan),
     }

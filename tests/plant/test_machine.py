@@ -29,7 +29,7 @@ def test_feedback_does_not_depend_on_the_batches(sizes, disturbance):
 
 
 def test_feedback_is_of_the_rows_and_near_them():
-    tick, setpoint, slider, counts, torque, pressure, force = _run(Machine(PAPER), [len(ROWS)])
+    tick, setpoint, slider, counts, torque, pressure, force, deposited = _run(Machine(PAPER), [len(ROWS)])
     assert (tick == ROWS.tick).all()
     assert (setpoint == ROWS.slider).all()
     assert 1e-7 < np.abs(slider - setpoint).max() < 1e-4
@@ -37,6 +37,7 @@ def test_feedback_is_of_the_rows_and_near_them():
     assert 0.003 < np.abs(torque).max() < 0.1
     assert 79e3 < pressure.max() <= 80e3
     assert force.shape == (0, 3)  # no force sensors on this machine
+    assert deposited.shape == pressure.shape
 
 
 def test_a_stuck_slider_stays_where_it_is():
