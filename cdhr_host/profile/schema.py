@@ -22,6 +22,7 @@ from cdhr_host.profile.fields import (
     to_si,
 )
 from cdhr_host.profile.serving import Serve
+from cdhr_host.profile.watch import Watch
 from cdhr_host.units import MM
 
 
@@ -290,4 +291,5 @@ class Profile(Section):
     drives: Drives
     canopen: CanOpen
     link: Link
+    watch: Watch = Watch()
     serve: Serve
