@@ -2,8 +2,8 @@
 
 The command travels to the valve (dead times of opening and of closing), the regulator follows
 with hysteresis and a first-order lag, the clay in hose and reservoir with another, and leaves
-the nozzle by its law. Clay stored by its compliance comes out when the pressure falls, and is
-missing when it rises. Every number is a function of state and input: no clock, and noise by seed.
+the nozzle by its law. Once the air is shut, part of the clay that was stored by compliance goes
+on oozing. Every number is a function of state and input: no clock, and noise by seed.
 """
 
 import math
@@ -37,6 +37,10 @@ class Paste:
     """s"""
     compliance: float = 0.0
     """m³/Pa of clay stored before the nozzle"""
+    ooze: float = 0.0
+    """share of the stored clay that runs out of the nozzle once the air is shut"""
+    ooze_lag: float = 0.3
+    """s, time constant of that"""
     hysteresis: float = 0.0
     """Pa by which the command must turn before the regulator follows"""
     noise: float = 0.0
@@ -45,7 +49,7 @@ class Paste:
 
     @classmethod
     def from_profile(cls, profile: Profile) -> Self:
-        """The clay as the profile knows it, without hysteresis and noise."""
+        """The clay as the profile knows it, without hysteresis, ooze and noise."""
         clay, law = profile.clay, flow_law(profile.extruder, profile.clay)
         lags = profile.drives.regulator_lag, clay.line_lag, clay.open_dead, clay.close_dead
         return cls(law, *lags, clay.compliance)
@@ -65,6 +69,8 @@ class ClayState:
     """Pa behind the regulator"""
     line: float
     """Pa of the clay before the nozzle"""
+    stored: float
+    """m³ that will ooze if the air is shut now"""
 
 
 class Clay:
@@ -76,11 +82,12 @@ class Clay:
         self._regulator = Regulator(paste.regulator_lag, period)
         self._open, self._close = (math.floor(d / period + 0.5) for d in (paste.open_dead, paste.close_dead))
         self._line = _ramped(paste.line_lag, period)
+        self._kept = math.exp(-period / paste.ooze_lag)
 
     def standing(self, pressure: float = 0.0, rested: float = 0.0) -> ClayState:
         """Air off; ``pressure`` has vented for ``rested`` s, the clay's with it."""
         left = self._regulator.vented(pressure, rested)
-        return ClayState(np.zeros(max(self._open, self._close)), 0.0, 0.0, left, left)
+        return ClayState(np.zeros(max(self._open, self._close)), 0.0, 0.0, left, left, 0.0)
 
     def step(self, state: ClayState, tick: Ints, command: Array) -> tuple[ClayState, Array, Array]:
         """(N,) ticks, (N,) Pa, N >= 1 -> next state, (N,) Pa behind the regulator, (N,) m³/s deposited."""
@@ -89,10 +96,10 @@ class Clay:
         aimed = self._aimed(level, state.turned)
         pressure = self._regulator.step(state.pressure, aimed)
         line = self._followed(pressure, state)
-        flow = self._deposited(tick, line, state.line)
-        memory = sent[len(command) :]
-        after = ClayState(memory, kept, float(aimed[-1]), float(pressure[-1]), float(line[-1]))
-        return after, pressure, flow
+        stored, oozed = self._oozed(level > 0.0, line, state.stored)
+        memory, last = sent[len(command) :], float(pressure[-1])
+        after = ClayState(memory, kept, float(aimed[-1]), last, float(line[-1]), stored)
+        return after, pressure, self._noisy(tick, self._paste.law.flow(line) + oozed)
 
     def _arriving(self, sent: Array, kept: float, count: int) -> tuple[Array, float]:
         """(D + N,) commands -> (N,) Pa arriving at the regulator, and the last level of open air."""
@@ -124,16 +131,21 @@ class Clay:
         followed, _ = lfilter([late, early], [1.0, -keep], pressure, zi=memory)
         return np.asarray(followed, dtype=np.float64)
 
-    def _deposited(self, tick: Ints, line: Array, before: float) -> Array:
-        """(N,) m³/s that leaves the nozzle, never drawn back."""
-        flow = self._paste.law.flow(line)
-        if self._paste.compliance > 0.0:
-            out = -self._paste.compliance * np.diff(line, prepend=before) / self._period
-            flow = np.where(line > self._paste.law.threshold, np.maximum(flow + out, 0.0), 0.0)
-        if self._paste.noise > 0.0:
-            draws = [normal(self._paste.seed, NOISE_STREAM, int(k), 1)[0] for k in tick]
-            flow = flow * np.maximum(1.0 + self._paste.noise * np.array(draws), 0.0)
-        return np.asarray(flow, dtype=np.float64)
+    def _oozed(self, opened: Flags, line: Array, before: float) -> tuple[float, Array]:
+        """m³ stored after N ticks, (N,) m³/s of stored clay that runs out while the air is shut."""
+        store = self._paste.ooze * self._paste.compliance * np.maximum(line, 0.0)
+        count = len(line)
+        at = np.maximum.accumulate(np.where(opened, np.arange(1, count + 1), 0))
+        left = np.concatenate(([before], store))[at] * self._kept ** (np.arange(1, count + 1) - at)
+        lost = np.where(opened, 0.0, left * (1.0 / self._kept - 1.0))
+        return float(left[-1]), lost / self._period
+
+    def _noisy(self, tick: Ints, flow: Array) -> Array:
+        """(N,) m³/s with the noise of the paste, never drawn back."""
+        if self._paste.noise == 0.0:
+            return flow
+        draws = np.array([normal(self._paste.seed, NOISE_STREAM, int(k), 1)[0] for k in tick])
+        return np.asarray(flow * np.maximum(1.0 + self._paste.noise * draws, 0.0))
 
 
 def _number_of(on: Flags, dead: int, first: int, last: int) -> Ints:
