@@ -9,8 +9,21 @@ from cdhr_host.profile.fields import Section, key
 
 _NAME: Final = re.compile(r"[A-Z][A-Z0-9_]{2,39}")
 RESERVED: Final = frozenset(
-    """PAUSE RESUME CANCEL_PRINT SDCARD_PRINT_FILE SDCARD_RESET_FILE SAVE_GCODE_STATE RESTORE_GCODE_STATE
-    RESTART FIRMWARE_RESTART HELP STATUS RESPOND CLEAR_PAUSE""".split()
+    {
+        "CANCEL_PRINT",
+        "CLEAR_PAUSE",
+        "FIRMWARE_RESTART",
+        "HELP",
+        "PAUSE",
+        "RESPOND",
+        "RESTART",
+        "RESTORE_GCODE_STATE",
+        "RESUME",
+        "SAVE_GCODE_STATE",
+        "SDCARD_PRINT_FILE",
+        "SDCARD_RESET_FILE",
+        "STATUS",
+    }
 )
 """scripts that are there already"""
 
