@@ -16,7 +16,7 @@ from cdhr_host.drives.timing import CycleTiming
 from cdhr_host.errors import Problem
 from cdhr_host.profile.schema import Profile
 from cdhr_host.units import KPA, MM
-from cdhr_host.values import Array, Feedback, Setpoints
+from cdhr_host.values import Array, Feedback, Flags, Setpoints
 
 LATE_WINDOW: Final = 10.0
 """s over which late cycles are counted"""
@@ -221,7 +221,7 @@ class _Lasting:
         self._ticks = max(math.ceil(lasting / period), 1)
         self._run: Array | None = None
 
-    def first(self, bad: Array) -> tuple[int, int] | None:
+    def first(self, bad: Flags) -> tuple[int, int] | None:
         """(N, k) flags -> row and column at which one has lasted long enough; None while none has."""
         run = np.zeros(bad.shape[1]) if self._run is None else self._run
         counts = np.arange(1.0, len(bad) + 1.0)[:, None]

@@ -10,7 +10,13 @@ import pyarrow as pa
 import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 
-from cdhr_host.report.columns import FEEDBACK_COLUMNS, SETPOINT_COLUMNS, Column, run_columns, setpoint_columns
+from cdhr_host.pipeline.columns import (
+    FEEDBACK_COLUMNS,
+    SETPOINT_COLUMNS,
+    Column,
+    run_columns,
+    setpoint_columns,
+)
 from cdhr_host.values import Feedback, Setpoints
 
 ROW_GROUP = 50_000

@@ -9,8 +9,8 @@ import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 import pytest
 
+from cdhr_host.pipeline.columns import SETPOINT_COLUMNS
 from cdhr_host.report import log as log_module
-from cdhr_host.report.columns import SETPOINT_COLUMNS
 from cdhr_host.report.log import LogTargetError, RunLog, SetpointLog
 from cdhr_host.values import Feedback, Setpoints
 
