@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from typing import Final
 
 import numpy as np
 
@@ -10,14 +9,12 @@ from cdhr_host.drives.clock import Clock
 from cdhr_host.drives.link import LinkState, MachineLink
 from cdhr_host.drives.rows import RowQueue
 from cdhr_host.errors import DriveError, JobError, Problem
+from cdhr_host.job.echo import check_echo
 from cdhr_host.job.tally import RunSummary, Tally
 from cdhr_host.job.waiting import wait_for_credit
 from cdhr_host.motion.hold import ends_at_rest
-from cdhr_host.units import MM
 from cdhr_host.values import Array, Feedback, Setpoints
 
-ROUNDED: Final = 0.5 + 1e-4
-"""of the resolution: what rounding to the nearest may change"""
 Observer = Callable[[Setpoints, Feedback], None]
 
 
@@ -139,7 +136,7 @@ class Streamer:
         if len(feedback) > len(self._sent):
             raise DriveError(Problem("echo", "the drives executed more rows than were sent"))
         rows = self._sent.take(len(feedback))
-        _check_echo(rows, feedback, self._link.resolution)
+        check_echo(rows, feedback, self._link.resolution)
         self._tally.add(rows, feedback)
         self._on_rows(rows, feedback)
 
@@ -163,23 +160,3 @@ class Streamer:
             wait_for_credit(self._link, self._clock)
             with suppress(Exception):
                 self._collect()
-
-
-def _check_echo(rows: Setpoints, feedback: Feedback, resolution: float) -> None:
-    """DriveError unless the far side received exactly the rows sent, rounded to ``resolution`` m."""
-    away = np.abs(feedback.setpoint - rows.slider)
-    other = (away > resolution * ROUNDED).any(axis=1) | (feedback.tick != rows.tick)
-    if not other.any():
-        return
-    row = int(other.argmax())
-    axis = int(away[row].argmax())
-    sent, executed = rows.slider[row, axis] / MM, feedback.setpoint[row, axis] / MM
-    raise DriveError(
-        Problem(
-            "echo",
-            f"the drives executed slider {axis + 1} = {executed:.6f} mm at tick {feedback.tick[row]}, "
-            f"sent was {sent:.6f} mm for tick {rows.tick[row]}",
-            line=int(rows.line[row]),
-            hint="the link between host and drives corrupts data: check cables and firmware",
-        )
-    )

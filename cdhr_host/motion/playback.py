@@ -152,7 +152,11 @@ class Pace:
             for k, each in enumerate(self.ramps)
             if cuts[k + 1] > cuts[k] or len(t) == 0
         ]
-        return parts[0] if len(parts) == 1 else Beat(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+        return (
+            parts[0]
+            if len(parts) == 1
+            else Beat(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+        )
 
     def start(self, t: float) -> Start:
         """What a ramp from a tick on continues."""
@@ -163,13 +167,16 @@ class Pace:
     def whole(self, first: float) -> bool:
         """Whether from this tick on the plan is played as it is, tick for tick."""
         last = self.ramps[-1]
-        return first >= last.begin and self.target == 1.0 and (last.u - last.begin).is_integer()
+        return first >= last.begin and self.target == 1.0 and float(last.u - last.begin).is_integer()
 
     def then(self, ramped: Ramp) -> "Pace":
         """As it is up to a ramp's beginning, then the ramp, then what it leads to."""
         target = _target(ramped)
         after = _after(ramped, target)
-        if target == 1.0 and abs(offset := after.u - after.begin - round(after.u - after.begin)) < WHOLE * 1e3:
+        if (
+            target == 1.0
+            and abs(offset := after.u - after.begin - round(after.u - after.begin)) < WHOLE * 1e3
+        ):
             after = steady(after.begin, after.u - offset, 1.0)
         return Pace((*self._before(ramped.begin), ramped, after))
 

@@ -110,6 +110,10 @@ class Course:
         ]
         return ToolTrack.joined(parts)
 
+    def nozzle(self, u: Array) -> ToolTrack:
+        """(N,) ascending ticks of the plan -> the nozzle at them, named by nothing."""
+        return self.unshaped(np.zeros(len(u), dtype=np.int64), u)
+
     def shift_at(self, u: float) -> Shift | None:
         """The shift a time of the plan falls on, if it does."""
         found = self.placed_at(u).step

@@ -110,12 +110,16 @@ class Score:
 
     def _sampled(self, part: Part, tick: Ints, beat: Beat) -> Setpoints:
         """The rows of a part."""
-        seen = int(tick[0]) - math.ceil(self.staircase.shaper.length / self.staircase.period) if len(tick) else 0
+        seen = (
+            int(tick[0]) - math.ceil(self.staircase.shaper.length / self.staircase.period) if len(tick) else 0
+        )
         steady = self.gain.after == 1.0 and len(tick) > 0 and self.gain.settled <= tick[0]
         if steady and part.pace.whole(seen) and (seen >= part.tick or part is self.parts[0]):
             first = round(float(beat.u[0]))
             return renumbered(part.course.rows(first, first + len(tick)), tick, self.staircase.period)
-        checked = [self._run(part, tick[run], Beat(*(each[run] for each in beat))) for run in _runs(part, beat)]
+        checked = [
+            self._run(part, tick[run], Beat(*(each[run] for each in beat))) for run in _runs(part, beat)
+        ]
         problems = [problem for each in checked for problem in each.problems]
         if problems:
             raise MotionError(problems)

@@ -53,9 +53,7 @@ def nozzle_standing_at(track: ToolTrack, tick: Ints) -> ToolTrack:
     """Ticks (N,) at which the nozzle stands where ``track`` begins."""
     still, nothing = np.zeros((len(tick), 3)), np.zeros(len(tick))
     line = np.full(len(tick), track.line[0])
-    return ToolTrack(
-        tick, line, still + track.position_G[0], still, still.copy(), nothing, nothing.copy()
-    )
+    return ToolTrack(tick, line, still + track.position_G[0], still, still.copy(), nothing, nothing.copy())
 
 
 def played_shift(step: Shift, tick: Ints, beat: Beat, period: float) -> Shift:

@@ -1,0 +1,32 @@
+"""Whether the far side executed what it was sent."""
+
+from typing import Final
+
+import numpy as np
+
+from cdhr_host.errors import DriveError, Problem
+from cdhr_host.units import MM
+from cdhr_host.values import Feedback, Setpoints
+
+ROUNDED: Final = 0.5 + 1e-4
+"""of the resolution: what rounding to the nearest may change"""
+
+
+def check_echo(rows: Setpoints, feedback: Feedback, resolution: float) -> None:
+    """DriveError unless the far side received exactly the rows sent, rounded to ``resolution`` m."""
+    away = np.abs(feedback.setpoint - rows.slider)
+    other = (away > resolution * ROUNDED).any(axis=1) | (feedback.tick != rows.tick)
+    if not other.any():
+        return
+    row = int(other.argmax())
+    axis = int(away[row].argmax())
+    sent, executed = rows.slider[row, axis] / MM, feedback.setpoint[row, axis] / MM
+    raise DriveError(
+        Problem(
+            "echo",
+            f"the drives executed slider {axis + 1} = {executed:.6f} mm at tick {feedback.tick[row]}, "
+            f"sent was {sent:.6f} mm for tick {rows.tick[row]}",
+            line=int(rows.line[row]),
+            hint="the link between host and drives corrupts data: check cables and firmware",
+        )
+    )
