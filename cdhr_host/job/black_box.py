@@ -101,9 +101,9 @@ class BlackBox:
 def read_black_box(path: Path) -> tuple[dict[str, Column], dict[str, Any]]:
     """The columns, (N,) each, and ``meta``; raises JobError for a file that is no black box."""
     try:
-        with np.load(path, allow_pickle=False) as archive:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             columns = {name: archive[name] for name in archive.files}
         meta = json.loads(str(columns.pop("meta")))
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
+    except (OSError, ValueError, KeyError, TypeError, EOFError, BadZipFile) as error:
         raise JobError(Problem("black-box", f"{path} is not a black box: {error}")) from error
     return columns, meta
