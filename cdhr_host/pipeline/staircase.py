@@ -41,9 +41,10 @@ class Staircase:
     It starts at the reference pose. Each text ends at rest, so that the next can follow.
     """
 
-    def __init__(self, profile: Profile, *, rate_hz: float | None = None) -> None:
+    def __init__(self, profile: Profile, *, rate_hz: float | None = None, rig: Rig | None = None) -> None:
+        """``rig`` is the profile's, where it is at hand."""
         self.profile = profile
-        self.rig = Rig.from_profile(profile)
+        self.rig = rig or Rig.from_profile(profile)
         self._period = profile.drives.period if rate_hz is None else 1.0 / rate_hz
         self._limits = self.rig.limits()
         self._audit = Audit(profile)
@@ -67,14 +68,18 @@ class Staircase:
         """What the next line inherits from those read so far."""
         return self._interpreter.modal
 
-    def stand_at(self, at_G: Array) -> None:
-        """The machine was stopped on its way and stands at (3,) m; modal state stays otherwise."""
+    def stand_at(self, at_G: Array, upper: Array | None = None) -> None:
+        """The machine was stopped on its way and stands at (3,) m; modal state stays otherwise.
+
+        ``upper`` (3,) m is the upper platform's displacement, if it is not where it belongs.
+        """
         x, y, z = at_G.tolist()
         self._planner, self._timeline = (
             self._planner.moved_to(at_G),
             Timeline(self._period, profile_shaper(self.profile)),
         )
         self._interpreter.modal = replace(self._interpreter.modal, position=(x, y, z), onward=None)
+        self._offset = self._wanted() if upper is None else upper - (at_G - self.rig.cables.reference_G)
 
     def timed(self, chunks: Iterable[bytes], *, ends: bool = True) -> Iterator[Command | Timed | Shift]:
         """Each command of a text, after the stretches it settles; ends at rest.
@@ -123,6 +128,20 @@ class Staircase:
         other = copy.copy(self)
         other._planner, other._timeline = self._planner.fork(override), copy.copy(self._timeline)
         return other
+
+    def apart(self) -> "Staircase":
+        """The same machine where it stands now, with modal state of its own."""
+        other = Staircase(self.profile, rig=self.rig)
+        other._planner, other._timeline = self._planner.fork(), copy.copy(self._timeline)
+        other._offset = self._offset
+        x, y, z = self._planner.standing.at_G.tolist()
+        other._interpreter.modal = replace(other._interpreter.modal, position=(x, y, z))
+        return other
+
+    @property
+    def standing_G(self) -> Array:
+        """(3,) m, where the nozzle stands once all that is planned was done."""
+        return self._planner.standing.at_G
 
     @property
     def tick(self) -> int:
@@ -186,7 +205,7 @@ class Staircase:
 
     def _audited(self, track: ToolTrack, q: Array, upper: UpperMotion, problems: list[Problem]) -> Checked:
         state = self.rig.state(q, track, upper)
-        air = air_command(track.flow, track.air, self.profile.extruder)
+        air = air_command(track.flow, track.air, self.rig.air.law)
         setpoints = Setpoints(
             tick=track.tick,
             t=(track.tick * self._period).astype(np.float64),
