@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cdhr_host.cli.refusals import Refusal, about
+from cdhr_host.cli.refusals import Refusal, about, check_file
 
 if TYPE_CHECKING:
     from cdhr_host.drives import Clock, MachineLink
@@ -36,9 +36,6 @@ def check_log(log: Path | None, *, compact: bool = False) -> None:
     if log is None:
         return
     from cdhr_host.report import compact as packed
-    from cdhr_host.report.log import WRITERS, LogTargetError, check_target
+    from cdhr_host.report.log import WRITERS
 
-    try:
-        check_target(log, packed.WRITERS if compact else WRITERS)
-    except LogTargetError as error:
-        raise Refusal(f"cdhr: error: --log {log}: {error}") from error
+    check_file(log, packed.WRITERS if compact else WRITERS, "--log")

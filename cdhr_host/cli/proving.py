@@ -1,6 +1,6 @@
 """The whole file is proven before anything moves: what ``dry-run`` and ``stream`` share."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,17 +25,24 @@ class LogWish:
 
 
 def proven(
-    source: Source, machine: "Profile", *, rate: float | None = None, log: LogWish | None = None
+    source: Source,
+    machine: "Profile",
+    *,
+    rate: float | None = None,
+    log: LogWish | None = None,
+    see: "Callable[[Checked], None] | None" = None,
 ) -> "Proof":
     """Walk the staircase once without drives; the log is kept only when all is well.
 
-    Raises ProgramError for a program that is not understood.
+    ``see`` is shown every block that is computed. Raises ProgramError for a program that is not understood.
     """
     from cdhr_host.pipeline import prove
 
     with _log(log, machine, rate) as (out, takes), Progress("checking") as progress:
 
         def watch(checked: "Checked") -> None:
+            if see is not None:
+                see(checked)
             if len(block := checked.setpoints):
                 progress.show(source.fraction, f"line {block.line[-1]}  {clock_text(block.t[-1])} of motion")
 

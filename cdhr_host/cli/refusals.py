@@ -1,7 +1,7 @@
 """What ends a command early: one place turns every refusal into words and an exit code."""
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import zip_longest
 from pathlib import Path
@@ -58,6 +58,16 @@ def writing(path: Path, consequence: str = "") -> Iterator[None]:
         yield
     except OSError as error:
         raise Refusal(f"cdhr: error: cannot write {path}: {error.strerror}{consequence}") from error
+
+
+def check_file(path: Path, suffixes: Collection[str], option: str) -> None:
+    """Refuse a file that could not be written, before any work."""
+    from cdhr_host.report.files import TargetError, check_place
+
+    try:
+        check_place(path, suffixes)
+    except TargetError as error:
+        raise Refusal(f"cdhr: error: {option} {path}: {error}") from error
 
 
 def say(text: str) -> None:

@@ -17,14 +17,11 @@ from cdhr_host.pipeline.columns import (
     run_columns,
     setpoint_columns,
 )
+from cdhr_host.report.files import check_place
 from cdhr_host.values import Feedback, Setpoints
 
 ROW_GROUP = 50_000
 """Rows held before they are written: 200 s at 250 Hz, some 10 MB."""
-
-
-class LogTargetError(ValueError):
-    """A log cannot be written there; the message says why and what would do."""
 
 
 def _schema(names: Sequence[str]) -> pa.Schema:
@@ -75,24 +72,11 @@ class _Parquet:
 WRITERS: dict[str, Callable[[BinaryIO, pa.Schema], Writer]] = {".csv": _Csv, ".parquet": _Parquet}
 
 
-def check_target(path: Path, writers: Mapping[str, object] = WRITERS) -> None:
-    """Refuse a log that could not be written there, before any work is done; raises LogTargetError."""
-    if path.suffix not in writers:
-        known = " or ".join(writers)
-        raise LogTargetError(f"'{path.name}' does not end in {known}: the suffix says which kind to write")
-    if path.exists() and not path.is_file():
-        raise LogTargetError(f"{path} is not a regular file")
-    if not path.parent.is_dir():
-        raise LogTargetError(f"there is no folder {path.parent}")
-    if not os.access(path.parent, os.W_OK):
-        raise LogTargetError(f"no permission to write in {path.parent}")
-
-
 class Log:
     """A log being written beside its target; ``keep`` puts it in place, leaving without it drops it.
 
     A context manager. Rows are columns of equal length, of the names and types of the schema.
-    Memory is bounded by ROW_GROUP rows. Raises LogTargetError at construction, OSError when the disk
+    Memory is bounded by ROW_GROUP rows. Raises TargetError at construction, OSError when the disk
     refuses.
     """
 
@@ -102,7 +86,7 @@ class Log:
         schema: pa.Schema,
         writers: Mapping[str, Callable[[BinaryIO, pa.Schema], Writer]] = WRITERS,
     ) -> None:
-        check_target(path, writers)
+        check_place(path, writers)
         self._path = path
         self._part = path.with_name(f".{path.name}.{os.getpid()}.part")
         self._schema = schema

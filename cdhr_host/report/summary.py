@@ -76,11 +76,16 @@ def duration_text(duration: float) -> str:
 
 def summary_lines(proof: Proof) -> Iterator[str]:
     """What a person wants to know of a program: one line each."""
+    return (f"  {name:<10} {text}" for name, text in summary_facts(proof))
+
+
+def summary_facts(proof: Proof) -> Iterator[tuple[str, str]]:
+    """The same as (name, text) pairs."""
     layers = f", {len(proof.layers)} layers" if proof.layers else ""
-    yield f"  program    {proof.lines} lines, {proof.moves} moves{layers}"
-    yield f"  time       {duration_text(proof.duration)}"
-    yield f"  path       {proof.path:.3f} m"
-    yield f"  clay       {proof.extruded / CM3:.1f} cm³"
+    yield "program", f"{proof.lines} lines, {proof.moves} moves{layers}"
+    yield "time", duration_text(proof.duration)
+    yield "path", f"{proof.path:.3f} m"
+    yield "clay", f"{proof.extruded / CM3:.1f} cm³"
     for name, columns, unit in (
         ("nozzle x", ["x_mm"], "mm"),
         ("nozzle y", ["y_mm"], "mm"),
@@ -92,10 +97,10 @@ def summary_lines(proof: Proof) -> Iterator[str]:
     ):
         known = [proof.extremes[column] for column in columns if column in proof.extremes]
         if known:
-            yield _range_line(name, known, unit)
+            yield name, _range_text(known, unit)
 
 
-def _range_line(name: str, ranges: Sequence[tuple[float, int, float, int]], unit: str) -> str:
+def _range_text(ranges: Sequence[tuple[float, int, float, int]], unit: str) -> str:
     low = min(ranges, key=lambda extreme: extreme[0])
     high = max(ranges, key=lambda extreme: extreme[2])
-    return f"  {name:<10} {low[0]:.2f} (line {low[1]}) to {high[2]:.2f} {unit} (line {high[3]})"
+    return f"{low[0]:.2f} (line {low[1]}) to {high[2]:.2f} {unit} (line {high[3]})"

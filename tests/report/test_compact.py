@@ -6,7 +6,8 @@ import pytest
 
 from cdhr_host.pipeline import open_profile, prove
 from cdhr_host.report.compact import COMPACT_COLUMNS, CompactLog
-from cdhr_host.report.log import LogTargetError, SetpointLog
+from cdhr_host.report.files import TargetError
+from cdhr_host.report.log import SetpointLog
 
 PROGRAM = b"M83\nG1 Z5 F1200\nG1 X60 Y-20 E300\nG1 X-30 Y40 Z9 E200\nG4 P200\nG1 X0 Y0 F3000\n"
 
@@ -45,5 +46,5 @@ def test_columns_are_delta_packed_integers_and_the_period_is_told(logs, tmp_path
 
 
 def test_only_parquet_is_compact(tmp_path):
-    with pytest.raises(LogTargetError, match=r"\.parquet"):
+    with pytest.raises(TargetError, match=r"\.parquet"):
         CompactLog(tmp_path / "a.csv", 0.001)

@@ -11,7 +11,8 @@ import pytest
 
 from cdhr_host.pipeline.columns import SETPOINT_COLUMNS
 from cdhr_host.report import log as log_module
-from cdhr_host.report.log import LogTargetError, RunLog, SetpointLog
+from cdhr_host.report.files import TargetError
+from cdhr_host.report.log import RunLog, SetpointLog
 from cdhr_host.values import Feedback, Setpoints
 
 CONTRACT = [
@@ -145,7 +146,7 @@ def test_an_older_log_survives_a_run_that_failed(tmp_path: Path) -> None:
 )
 def test_a_target_that_cannot_be_is_refused_at_once(tmp_path: Path, name: str, words: str) -> None:
     (tmp_path / "folder.csv").mkdir()
-    with pytest.raises(LogTargetError, match=words):
+    with pytest.raises(TargetError, match=words):
         SetpointLog(tmp_path / name)
 
 
