@@ -154,6 +154,11 @@ class Upload:
         self._part = folder.root / f".upload-{os.getpid()}-{id(self):x}"
         self._file = self._part.open("xb")
 
+    def put_in(self, folder: str) -> None:
+        """Into a folder of that name, after all."""
+        self._path = program_name(f"{folder}/{self._path.name}")
+        self.name = self._path.as_posix()
+
     def write(self, data: bytes) -> None:
         """Further bytes; JobError beyond the size limit or when the disk is nearly full."""
         self.size += len(data)

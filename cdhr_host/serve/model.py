@@ -62,6 +62,23 @@ def objects(view: View, names: Iterable[str] | None = None) -> dict[str, Object]
     return {name: each for name, each in found if each is not None}
 
 
+def chosen(found: dict[str, Object], wanted: dict[str, list[str] | None]) -> dict[str, Object]:
+    """Of each object the fields that are wanted; None wants all."""
+    return {
+        name: {key: value for key, value in each.items() if (keys := wanted.get(name)) is None or key in keys}
+        for name, each in found.items()
+    }
+
+
+def changes(before: dict[str, Object], after: dict[str, Object]) -> dict[str, Object]:
+    """Only what differs."""
+    pairs = (
+        (name, {key: value for key, value in each.items() if before.get(name, {}).get(key, ...) != value})
+        for name, each in after.items()
+    )
+    return {name: each for name, each in pairs if each}
+
+
 def object_names(profile: Profile) -> list[str]:
     """Every object there is."""
     return [*_OBJECTS, *(f"gcode_macro {name}" for name in macro_names(profile))]
@@ -299,6 +316,7 @@ def _workspace(view: View) -> Object:
         "referenced": status.referenced,
         "at_reference": status.homed,
         "job": status.state.value,
+        "left_s": number(status.progress.left, 1) if status.progress else None,
         "buffered_s": number(status.buffered * view.profile.drives.period, 3),
     }
 
