@@ -1,0 +1,14 @@
+"""What the keys do."""
+
+from typing import Final
+
+HELP: Final = """\
+arrows, PgUp, PgDn  jog x and y, z          + -     larger, smaller step or speed
+c                   steps / hold a key      h       home (G28)
+:                   type G-code (Esc leaves, up and down recall, right completes)
+space               hold, resume            [ ]     feed -10 %, +10 %
+F3                  load and prove a file   { }     flow -10 %, +10 %
+F5                  start the print         0       feed and flow 100 %
+F8                  abort: rest, lift       F9      acknowledge a fault
+!                   EMERGENCY STOP          q       quit (F10 too)
+"""
