@@ -134,16 +134,15 @@ def _range(rows: Array, name: str) -> tuple[float, float]:
 
 def _packed(rows: Array, low: Array, high: Array) -> bytes:
     """Columns one after another, each as differences of whole numbers: t, line, x, y, z, quantities, clay."""
-    whole = {
-        "t": (np.rint(rows[:, COLUMNS.index("t")] / MS), np.uint32),
-        "line": (rows[:, COLUMNS.index("line")], np.uint32),
-    }
-    for axis in range(3):
-        whole["xyz"[axis]] = (_share(rows[:, axis], low[axis], high[axis]), np.uint16)
-    for name in SCALES:
-        whole[name] = (_share(rows[:, COLUMNS.index(name)], *_range(rows, name)), np.uint16)
-    whole["flow"] = (rows[:, COLUMNS.index("flow")] > 0.0, np.uint8)
-    columns = [values.astype(kind) for values, kind in whole.values()]
+    clock, line, flow = (rows[:, COLUMNS.index(name)] for name in ("t", "line", "flow"))
+    places = [_share(rows[:, axis], low[axis], high[axis]) for axis in range(3)]
+    shown = [_share(rows[:, COLUMNS.index(name)], *_range(rows, name)) for name in SCALES]
+    columns: list[np.ndarray] = [
+        np.rint(clock / MS).astype(np.uint32),
+        line.astype(np.uint32),
+        *(values.astype(np.uint16) for values in (*places, *shown)),
+        (flow > 0.0).astype(np.uint8),
+    ]
     return b"".join(np.diff(column, prepend=column.dtype.type(0)).tobytes() for column in columns)
 
 

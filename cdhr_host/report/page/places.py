@@ -19,7 +19,8 @@ def place_of(problem: Problem, checked: Checked) -> Array:
     away = np.abs(_numbers(problem.kind, checked) - wanted)
     away = np.where(np.isnan(away), np.inf, away).min(axis=1)
     away[track.line != problem.line] = np.inf
-    return track.position_G[int(away.argmin())].copy()
+    place: Array = track.position_G[int(away.argmin())].copy()
+    return place
 
 
 def _numbers(kind: str, checked: Checked) -> Array:

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from cdhr_host.values import Array, Flags
+from cdhr_host.values import Array, Flags, Ints
 
 PASSES = 8
 """each at most halves; the tolerances of all passes add up to less than one"""
 
 
-def thinned(rows: Array, scale: Array, breaks: Array) -> Array:
+def thinned(rows: Array, scale: Array, breaks: Flags) -> Ints:
     """(M, k) vertices, (k,) tolerances, (M,) kinds -> (M',) indices of the vertices to keep.
 
     Every vertex left out is within the tolerances of the polyline that is kept: the first three
@@ -23,7 +23,7 @@ def thinned(rows: Array, scale: Array, breaks: Array) -> Array:
     return kept
 
 
-def _spare(rows: Array, breaks: Array, tolerance: float) -> Flags:
+def _spare(rows: Array, breaks: Flags, tolerance: float) -> Flags:
     """(M,) which odd vertices lie on the line between their neighbours."""
     spare = np.zeros(len(rows), dtype=np.bool_)
     middle = np.arange(1, len(rows) - 1, 2)
