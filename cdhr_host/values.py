@@ -234,12 +234,6 @@ class Setpoints(_Frozen):
     def __getitem__(self, rows: slice | Flags) -> "Setpoints":
         return Setpoints(*(getattr(self, field.name)[rows] for field in fields(self)))
 
-    @classmethod
-    def joined(cls, parts: "Sequence[Setpoints]") -> "Setpoints":
-        """One after the other."""
-        columns = ([getattr(part, field.name) for part in parts] for field in fields(cls))
-        return cls(*(np.concatenate(column) for column in columns))
-
 
 @dataclass(frozen=True, slots=True)
 class Feedback(_Frozen):

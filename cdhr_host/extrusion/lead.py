@@ -12,9 +12,9 @@ dead time of its own: when it is the longer one, the last levels cannot be sent 
 level before them lasts, which the inverse allows for.
 """
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import pairwise
-from typing import Final
+from typing import Any, ClassVar, Final, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from cdhr_host.extrusion.following import follow, settle
 from cdhr_host.extrusion.model import AirModel, ticks
 from cdhr_host.extrusion.past import Past
 from cdhr_host.extrusion.wanted import Gaps, Wanted, coasted, until_shut, wanted
-from cdhr_host.values import Array, Ints, Setpoints
+from cdhr_host.values import Array, Flags, Ints
 
 LEAST: Final = 200.0
 """Pa: the lowest level of open air; 0 would shut the valve"""
@@ -31,7 +31,35 @@ COASTING: Final = 1.0
 """s looked ahead for the end of a bead where clay is left to run out"""
 
 
-class AirStage:
+class Rows(Protocol):
+    """N consecutive ticks: what a stage needs of them, a dataclass."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def tick(self) -> Ints:
+        """(N,)"""
+        ...
+
+    @property
+    def nozzle_G(self) -> Array:
+        """(N, 3) m"""
+        ...
+
+    @property
+    def flow(self) -> Array:
+        """(N,) m³/s"""
+        ...
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, rows: slice | Flags) -> Self: ...
+
+
+R = TypeVar("R", bound=Rows)
+
+
+class AirStage(Generic[R]):
     """Rows in, the same rows out with the pressure command in them, ``lead`` ticks later.
 
     Rows come in batches of any size, their ticks consecutive; the result does not depend on the
@@ -47,11 +75,11 @@ class AirStage:
         coasting = ticks(COASTING, period) if model.coast > 0.0 else 0
         self._ahead = self._gaps.longest + max(self._close - self._open, 0) + coasting + 2
         self.lead = max(self._open, self._close) + self._ahead if model.leads else 0
-        self._rows: Setpoints | None = None
+        self._rows: R | None = None
         self._past = Past()
         self._lasting = 0
 
-    def push(self, rows: Setpoints) -> Setpoints:
+    def push(self, rows: R) -> R:
         """Further rows -> those whose pressure no later row can change."""
         if not self.lead or not len(rows):
             return rows
@@ -59,11 +87,11 @@ class AirStage:
             self._past.begin(int(rows.tick[0]), self._open)
         if self._rows is not None and rows.tick[0] != self._rows.tick[-1] + 1:
             raise ValueError(f"rows go on at tick {rows.tick[0]}, not {self._rows.tick[-1] + 1}")
-        self._rows = rows if self._rows is None else Setpoints.joined([self._rows, rows])
+        self._rows = rows if self._rows is None else _joined(self._rows, rows)
         self._arrive(int(rows.tick[-1]) + 1 - self._ahead, self._flow(self._rows))
         return self._sent()
 
-    def flush(self) -> Setpoints | None:
+    def flush(self) -> R | None:
         """The rows still held, if any, as they are when the nozzle stands after them."""
         rows = self._rows
         if rows is None or not len(rows):
@@ -85,7 +113,7 @@ class AirStage:
         if self._past.cut(tick + self._open) and self._past.level > 0.0:
             self._lasting = tick + self._close
 
-    def _flow(self, rows: Setpoints) -> Array:
+    def _flow(self, rows: R) -> Array:
         if self._model.coast == 0.0:
             return rows.flow
         steps = np.linalg.norm(np.diff(rows.nozzle_G, axis=0, prepend=rows.nozzle_G[:1]), axis=1)
@@ -132,7 +160,7 @@ class AirStage:
         around = np.concatenate(([self._past.wanted], plan.pressure, plan.pressure[-1:]))
         return np.asarray(plan.pressure + lag * (around[2:] - around[:-2]) / (2.0 * self._period))
 
-    def _sent(self) -> Setpoints:
+    def _sent(self) -> R:
         """The rows whose commands are known, taken out of those held."""
         rows = self._rows
         assert rows is not None
@@ -148,3 +176,9 @@ class AirStage:
         begun, lasts = (self._past.opened(first + dead, count) for dead in (self._open, self._close))
         on = begun | lasts if self._close < self._open else begun & lasts
         return np.where(on, self._past.levels(first + self._open, count), 0.0)
+
+
+def _joined(rows: R, more: R) -> R:
+    """One after the other."""
+    names = [field.name for field in fields(rows)]
+    return type(rows)(*(np.concatenate((getattr(rows, name), getattr(more, name))) for name in names))

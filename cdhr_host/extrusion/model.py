@@ -9,6 +9,8 @@ import math
 from dataclasses import dataclass
 from typing import Final, Self
 
+import numpy as np
+
 from cdhr_host.extrusion.material import flow_law
 from cdhr_host.extrusion.rheology import PressureFlow
 from cdhr_host.profile import Profile
@@ -90,7 +92,7 @@ class AirModel:
     def flow_max(self) -> float:
         """m³/s: the greatest flow that is planned."""
         usable = self.pressure_max * (1.0 - RESERVE if self.lag > 0.0 else 1.0)
-        return float(self.law.flow(usable))
+        return float(self.law.flow(np.array(usable)))
 
 
 def is_led(profile: Profile) -> bool:

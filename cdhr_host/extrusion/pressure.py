@@ -1,10 +1,10 @@
-"""The static model: below a threshold nothing flows, above it flow grows in proportion."""
+"""The static model: the pressure of a flow by the clay's law, as if the air acted at once."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from cdhr_host.profile import Extruder
+from cdhr_host.extrusion.rheology import PressureFlow
 from cdhr_host.values import Array
 
 
@@ -18,15 +18,17 @@ class AirCommand:
     """Pa, gauge; 0 is air off"""
 
 
-def air_command(flow: Array, held: Array, extruder: Extruder) -> AirCommand:
+def air_command(flow: Array, held: Array, law: PressureFlow) -> AirCommand:
     """(N,) m³/s of planned flow, (N,) Pa held by air words -> flow and pressure.
 
-    p = threshold + slope · flow where clay is planned, else the held pressure, whose flow is
-    (p - threshold) / slope; 0 where neither asks for clay. The result is not bounded by the
-    supply: whoever uses it refuses what exceeds pressure_max.
+    The law's pressure where clay is planned, else the held pressure with the flow it gives;
+    0 where neither asks for clay. The result is not bounded by the supply: whoever uses it
+    refuses what exceeds pressure_max.
     """
     pushed = flow > 0.0
-    needed = extruder.pressure_threshold + extruder.pressure_slope * flow
-    pressure = np.where(pushed, needed, held)
-    given = np.maximum(pressure - extruder.pressure_threshold, 0.0) / extruder.pressure_slope
-    return AirCommand(np.where(pushed, flow, given), pressure)
+    pressure = np.array(held, dtype=np.float64)
+    pressure[pushed] = law.pressure(flow[pushed])
+    given = np.array(flow, dtype=np.float64)
+    blown = ~pushed & (pressure > 0.0)
+    given[blown] = law.flow(pressure[blown])
+    return AirCommand(given, pressure)

@@ -107,9 +107,7 @@ class Leg:
 class LegPlanner:
     """Collects the segments of one leg and commits what is settled."""
 
-    def __init__(
-        self, limits: MotionLimits, number: int = 0, override: FeedOverride = AS_PROGRAMMED
-    ) -> None:
+    def __init__(self, limits: MotionLimits, number: int = 0, override: FeedOverride = AS_PROGRAMMED) -> None:
         self._limits = limits
         self._number = number
         self._override = override
@@ -152,8 +150,16 @@ class LegPlanner:
         span = (self._first, float(known))
         if span[1] <= span[0]:
             return None
-        feed = segments.wanted(self._override)[path.segment]
-        found = cells(path, feed, span, self._limits, passed=self._passed, inside=self._inside)
+        feed, share = self._paces(segments)
+        found = cells(
+            path,
+            feed[path.segment],
+            span,
+            self._limits,
+            share=share[path.segment],
+            passed=self._passed,
+            inside=self._inside,
+        )
         speeds, forward = border_speeds(found, self._entry, None if rounded else 0.0)
         self._check_entry(speeds[0])
         count = len(found.start) if closes else _settled(found, speeds == forward)
@@ -164,6 +170,11 @@ class LegPlanner:
         if not closes:
             self._advance(found, count, float(speeds[count]))
         return leg
+
+    def _paces(self, segments: Segments) -> tuple[Array, Array]:
+        """(M,) m/s wanted, (M,) share of acceleration and jerk that the air leaves for changing it."""
+        limits, feed = self._limits, segments.wanted(self._override)
+        return feed, limits.flow.share(feed, segments.clay, limits.acceleration, limits.jerk)
 
     def _start(self, segments: Segments) -> None:
         """Begin at rest in time where the path begins straight, else at rest in s."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.mechanism import UpperBounds
+from cdhr_host.motion.flow import FlowLimits
 from cdhr_host.motion.shaping import Shaper, shaper
 from cdhr_host.motion.smooth_path import SmoothPath
 from cdhr_host.profile import Profile
@@ -43,6 +44,8 @@ CHORD_ERROR = 1e-6
 
 FOLLOWING = UpperBounds(1.0, 0.0, 0.0)
 """An upper platform at a constant offset."""
+UNBOUNDED = FlowLimits()
+"""Air that pushes anything."""
 
 
 def _too_slow_sliders(speed: float) -> Problem:
@@ -89,9 +92,17 @@ class MotionLimits:
     """rad, a corner turning more than this is an exact stop"""
     shaped: float = 0.0
     """m, the part of every tolerance that input shaping needs"""
+    flow: FlowLimits = UNBOUNDED
+    """of the air"""
 
     @classmethod
-    def from_profile(cls, profile: Profile, bend: float, upper: UpperBounds = FOLLOWING) -> "MotionLimits":
+    def from_profile(
+        cls,
+        profile: Profile,
+        bend: float,
+        upper: UpperBounds = FOLLOWING,
+        flow: FlowLimits = UNBOUNDED,
+    ) -> "MotionLimits":
         """Nozzle limits under which the sliders' limits hold too.
 
         ``bend`` (1/m) bounds, over the bed, how much a cable's direction turns for each metre
@@ -115,7 +126,7 @@ class MotionLimits:
         if shaped > profile.path.tolerance / 2:
             raise MotionError(_too_slow_mode(shaped, profile))
         smoothed = half_width(profile.path.tolerance - shaped)
-        return cls(v, a, j, smoothed, profile.path.stop_angle, shaped)
+        return cls(v, a, j, smoothed, profile.path.stop_angle, shaped, flow)
 
     def within(self, tolerance: float) -> "MotionLimits":
         """The same limits with the smoothing that a tolerance (m) allows."""
@@ -166,6 +177,7 @@ class _Pieces:
     start: Array
     length: Array
     feed: Array
+    share: Array
     bend: Array
     change: Array
     bent: Flags
@@ -177,23 +189,26 @@ def cells(
     span: tuple[float, float],
     limits: MotionLimits,
     *,
+    share: Array,
     passed: float,
     inside: bool,
 ) -> Cells:
     """Cells of a path over a span of s.
 
-    ``feed`` (K,) m/s is the programmed speed on each piece; ``inside`` says that the span
+    ``feed`` (K,) m/s is the programmed speed on each piece, ``share`` (K,) of acceleration and
+    jerk what the air leaves for changing it; ``inside`` says that the span
     begins inside a long bend begun earlier. A leg is divided where its length, of which
     ``passed`` (m) lies before s = 0, is a multiple of a cell's; so it is divided alike
     whenever it is planned again, and what could be braked from a border still can.
     """
-    pieces = _between(path, feed, span)
+    pieces = _between(path, feed, share, span)
     group, roomy = _groups(pieces, limits.half_width, passed, inside=inside)
     heads = np.flatnonzero(np.diff(group, prepend=group[0] - 1))
     cap = np.minimum(np.minimum.reduceat(pieces.feed, heads), limits.speed)
     bend = np.maximum.reduceat(pieces.bend, heads)
     change = np.maximum.reduceat(pieces.change, heads)
-    speed, share = _budget(cap, bend, change, roomy[heads], limits)
+    speed, spent = _budget(cap, bend, change, roomy[heads], limits)
+    share = np.minimum(spent, np.minimum.reduceat(pieces.share, heads))
     settled = pieces.start[heads[-1]] if pieces.bent[-1] else span[1]
     merged = _merge_heads(pieces.start[heads] + passed, speed, share)
     length = np.add.reduceat(np.add.reduceat(pieces.length, heads), merged)
@@ -202,7 +217,7 @@ def cells(
     return Cells(pieces.start[heads], length, speed[merged], a, j, float(settled), roomy[heads])
 
 
-def _between(path: SmoothPath, feed: Array, span: tuple[float, float]) -> _Pieces:
+def _between(path: SmoothPath, feed: Array, share: Array, span: tuple[float, float]) -> _Pieces:
     """The pieces of a path that lie in a span of s, cut at its ends."""
     ends = np.append(path.start[1:], path.end)
     first = span[0] + min(TOUCHING, (span[1] - span[0]) / 2)
@@ -210,7 +225,7 @@ def _between(path: SmoothPath, feed: Array, span: tuple[float, float]) -> _Piece
     start = np.maximum(path.start[used], span[0])
     bend, change = (bound[used] for bound in path.bounds())
     length = np.minimum(ends[used], span[1]) - start
-    return _Pieces(start, length, feed[used], bend, change, path.bending[used] > 0)
+    return _Pieces(start, length, feed[used], share[used], bend, change, path.bending[used] > 0)
 
 
 def _groups(pieces: _Pieces, h: float, passed: float, *, inside: bool) -> tuple[Ints, Flags]:

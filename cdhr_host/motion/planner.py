@@ -45,6 +45,7 @@ class Planner:
         self._number = 0
         self._leg = LegPlanner(limits)
         self._direction: Array | None = None
+        self._clay = 0.0
         self._at = np.array(at_G, dtype=float)
         self._line = 0
 
@@ -120,7 +121,8 @@ class Planner:
 
     @_take.register
     def _(self, command: Prime) -> Iterator[Stretch]:
-        return self._stand(command.clay / command.flow, command.flow, command.line)
+        flow = min(command.flow, self._limits.flow.greatest)
+        return self._stand(command.clay / flow, flow, command.line)
 
     @_take.register(Pause | Stop)
     def _(self, _: Pause | Stop) -> Iterator[Stretch]:
@@ -153,11 +155,12 @@ class Planner:
             yield from self._draw(drawn, stops)
 
     def _draw(self, drawn: Segments, stops: Flags) -> Iterator[Stretch]:
-        """Add segments to the leg; close it before those in ``stops`` (M,) and before sharp corners."""
-        drawn = replace(drawn, feed=np.minimum(drawn.feed, self._limits.speed))
+        """Add segments to the leg; close it before those in ``stops`` (M,), sharp corners, jumps of flow."""
+        flow = self._limits.flow
+        drawn = replace(drawn, feed=flow.feed(np.minimum(drawn.feed, self._limits.speed), drawn.clay))
         steps = np.diff(drawn.points, axis=0)
         direction = steps / norms(steps)[:, None]
-        stops = stops | self._sharp(direction)
+        stops = stops | self._sharp(direction) | flow.jumps(drawn.clay, self._clay)
         first = 0
         for corner in [*np.flatnonzero(stops).tolist(), len(drawn)]:
             if corner > first:
@@ -167,7 +170,7 @@ class Planner:
             elif self._leg.due and (leg := self._leg.plan(closes=False)) is not None:
                 yield leg
             first = corner
-        self._direction = direction[-1]
+        self._direction, self._clay = direction[-1], float(drawn.clay[-1])
         self._at, self._line = drawn.points[-1], int(drawn.line[-1])
 
     def _sharp(self, direction: Array) -> Flags:

@@ -7,12 +7,14 @@ from functools import singledispatchmethod
 import numpy as np
 
 from cdhr_host.errors import MAX_LISTED, Problem
+from cdhr_host.extrusion import AirStage
 from cdhr_host.motion.arc import arc_length
 from cdhr_host.motion.curves import spline_length
 from cdhr_host.motion.sampling import Timed
 from cdhr_host.motion.smooth_path import norms
 from cdhr_host.pipeline.clearing import Clearing
 from cdhr_host.pipeline.columns import setpoint_columns
+from cdhr_host.pipeline.leading import Leading
 from cdhr_host.pipeline.shift import Shift
 from cdhr_host.pipeline.staircase import Checked, Staircase
 from cdhr_host.pipeline.survey import Survey
@@ -86,21 +88,37 @@ def prove(
     """
     staircase = Staircase(profile, rate_hz=rate_hz)
     chosen = Survey(staircase.rig).tracks if sink is None else Timed.tracks
-    tracer, clearing, tally = Tracer(staircase.rig), Clearing(profile), _Tally()
-    for step in staircase.timed(chunks):
-        if not isinstance(step, Timed | Shift):
-            tally.command(step)
-            continue
-        for checked in _computed(staircase, step, chosen):
-            tally.block(checked)
-            tally.collisions(clearing.problems(checked.setpoints))
+    clearing, tally = Clearing(profile), _Tally()
+    tracer = Tracer(staircase.rig, staircase.period)
+
+    def seen(steps: Iterable[Command | Checked]) -> None:
+        for step in steps:
+            if not isinstance(step, Checked):
+                tally.command(step)
+                continue
+            tally.block(step)
+            tally.collisions(clearing.problems(step.setpoints))
             if sink is not None and not (staircase.problems or tally.collided):
-                sink(checked.setpoints)
+                sink(step.setpoints)
             if watch is not None:
-                watch(checked)
+                watch(step)
+
+    def kept(traces: Iterable[Trace]) -> None:
         if trace is not None and not (staircase.problems or tally.collided):
-            for traced in tracer.traces(step):
+            for traced in traces:
                 trace(traced)
+
+    leading = Leading(AirStage(staircase.rig.air, staircase.period) if sink is not None else None)
+    for step in staircase.timed(chunks):
+        if isinstance(step, Timed | Shift):
+            for checked in _computed(staircase, step, chosen):
+                seen(leading.push(checked))
+            kept(tracer.traces(step))
+        else:
+            seen(leading.push(step))
+            kept(tracer.command(step))
+    seen(leading.finish())
+    kept(tracer.finish())
     return tally.proof(staircase, clearing.warning)
 
 

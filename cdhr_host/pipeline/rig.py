@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from cdhr_host.extrusion import AirModel
 from cdhr_host.mechanism import (
     Cables,
     Give,
@@ -19,6 +20,7 @@ from cdhr_host.mechanism import (
     upper_bounds,
 )
 from cdhr_host.motion.limits import MotionLimits
+from cdhr_host.pipeline.pushing import flow_limits
 from cdhr_host.profile import Profile
 from cdhr_host.values import Array, CableState, ToolTrack
 
@@ -37,6 +39,7 @@ class Rig:
     """1/m, of ``direction_change_bound``"""
     give: Give | None
     """the cables' stretch, where setpoints allow for it"""
+    air: AirModel
 
     @classmethod
     def from_profile(cls, profile: Profile) -> "Rig":
@@ -51,11 +54,12 @@ class Rig:
             upper_bounds(profile, policy),
             direction_change_bound(profile),
             Give.from_profile(profile) if profile.stretch.compensation == "on" else None,
+            AirModel.from_profile(profile),
         )
 
     def limits(self) -> MotionLimits:
         """Limits of the nozzle that keep those of the sliders; raises MotionError where there are none."""
-        return MotionLimits.from_profile(self.profile, self.bend, self.upper)
+        return MotionLimits.from_profile(self.profile, self.bend, self.upper, flow_limits(self.air))
 
     def follow(self, track: ToolTrack) -> tuple[Array, UpperMotion]:
         """(N, 3) m, the nozzle platform's displacement, and the upper platform's motion."""

@@ -2,37 +2,29 @@
 
 import copy
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from cdhr_host.errors import MotionError, Problem
-from cdhr_host.extrusion import air_command
+from cdhr_host.extrusion import AirStage, air_command
 from cdhr_host.mechanism import UpperMotion
 from cdhr_host.motion.leg import AS_PROGRAMMED, FeedOverride
 from cdhr_host.motion.limits import profile_shaper
 from cdhr_host.motion.planner import Planner
-from cdhr_host.motion.sampling import Timed, Timeline
+from cdhr_host.motion.sampling import Stand, Timed, Timeline
 from cdhr_host.motion.shaping import Shaper
 from cdhr_host.pipeline.audit import Audit, on_bed
+from cdhr_host.pipeline.checked import Checked
+from cdhr_host.pipeline.leading import Leading
+from cdhr_host.pipeline.pushing import Pushing, lays
 from cdhr_host.pipeline.rig import Rig
 from cdhr_host.pipeline.shift import SAME, Shift, nozzle_standing, shift
 from cdhr_host.profile import Profile
 from cdhr_host.program import Interpreter, Modal
 from cdhr_host.values import Array, Command, Pause, Setpoints, ToolTrack
 
-
-@dataclass(frozen=True, slots=True)
-class Checked:
-    """A block of setpoints, each checked; only those on the bed are there."""
-
-    setpoints: Setpoints
-    problems: tuple[Problem, ...]
-    """what the machine cannot do of it, one for each line, limit and cable"""
-    track: ToolTrack
-    """the nozzle at every sample of the block, those off the bed too"""
-    nine: Array
-    """(N, 9) N at each setpoint: left and right cables of the pairs, then the upper ones"""
+__all__ = ["Checked", "Staircase"]
 
 
 class Staircase:
@@ -52,6 +44,7 @@ class Staircase:
         self._planner = Planner(self._limits, self.rig.cables.reference_G)
         self._interpreter = Interpreter(profile, at_G=self.rig.cables.reference_G)
         self._offset = np.zeros(3)
+        self._airless_since: int | None = 0
 
     @property
     def lines(self) -> int:
@@ -89,11 +82,14 @@ class Staircase:
         Before a Pause comes everything up to rest. Raises ProgramError, after the last line,
         for text that is not understood.
         """
+        pushing = Pushing(self.rig.air, self.profile.limits.speed_max)
         yield from self.opened()
         for command in self.commands(chunks):
+            yield from pushing.notices(command)
             yield from self.settled(command)
             yield command
         yield from self.closed(ends=ends)
+        yield from pushing.summary()
 
     def commands(self, chunks: Iterable[bytes]) -> Iterator[Command]:
         """A text's commands, by the modal state of those before it."""
@@ -102,14 +98,29 @@ class Staircase:
     def opened(self) -> Iterator[Shift]:
         """What comes before a text's first command."""
         self._audit = Audit(self.profile)
+        self._airless_since = self.tick
         yield from self._shift(self._wanted())
 
     def settled(self, command: Command) -> Iterator[Timed]:
         """Stretches that a further command settles; all there are before a Pause."""
+        if self._airless_since is not None and lays(command):
+            yield from self._awaited()
         for stretch in self._planner.stretches(command):
             yield self._timeline.lay(stretch)
         if isinstance(command, Pause):
             yield self._timeline.rest(self._planner.standing)
+            self._airless_since = self.tick
+
+    def _awaited(self) -> Iterator[Timed]:
+        """Stand before the first clay for as long as the air needs to be ready for it."""
+        for stretch in self._planner.close():
+            yield self._timeline.lay(stretch)
+        assert self._airless_since is not None
+        missing = self.rig.air.start_lead - (self.tick - self._airless_since - 2) * self._period
+        self._airless_since = None
+        if self.rig.air.leads and missing > 0.0:
+            standing = self._planner.standing
+            yield self._timeline.lay(Stand(standing.at_G, missing, 0.0, standing.line, standing.number))
 
     def closed(self, *, ends: bool) -> Iterator[Timed | Shift]:
         """What comes after a text's last command, up to rest."""
@@ -128,6 +139,10 @@ class Staircase:
         other = copy.copy(self)
         other._planner, other._timeline = self._planner.fork(override), copy.copy(self._timeline)
         return other
+
+    def restore(self, modal: Modal) -> None:
+        """Forget what lines read since then have set."""
+        self._interpreter.modal = modal
 
     def apart(self) -> "Staircase":
         """The same machine where it stands now, with modal state of its own."""
@@ -164,15 +179,15 @@ class Staircase:
         return self._timeline.shaper
 
     def walk(self, chunks: Iterable[bytes], *, ends: bool = True) -> Iterator[Command | Checked]:
-        """As ``timed``, with every setpoint of each stretch in its place."""
+        """As ``timed``, with every setpoint of each stretch in its place, the air led."""
+        leading = Leading(AirStage(self.rig.air, self._period))
         for step in self.timed(chunks, ends=ends):
             if isinstance(step, Timed):
                 for track in step.tracks():
-                    yield self.checked(track)
-            elif isinstance(step, Shift):
-                yield self.shifted(step)
+                    yield from leading.push(self.checked(track))
             else:
-                yield step
+                yield from leading.push(self.shifted(step) if isinstance(step, Shift) else step)
+        yield from leading.finish()
 
     def setpoints(self, chunks: Iterable[bytes], *, ends: bool = True) -> Iterator[Setpoints]:
         """Setpoints only; raises MotionError at the first the machine cannot do."""

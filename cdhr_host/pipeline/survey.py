@@ -22,7 +22,6 @@ from cdhr_host.motion.leg import Leg
 from cdhr_host.motion.sampling import BLOCK, Stand, Timed
 from cdhr_host.pipeline.audit import ROUNDING, on_bed
 from cdhr_host.pipeline.rig import Rig
-from cdhr_host.profile import Extruder
 from cdhr_host.values import Array, Flags, Ints, ToolTrack
 
 SPACING = 2e-3
@@ -69,7 +68,7 @@ class Survey:
     def _within(self, leg: Leg, found: LegBounds) -> bool:
         """Whether bounds alone keep a leg on the bed and inside the limits of nozzle, sliders and air."""
         limits, sliders, extruder = self._profile.limits, self._profile.sliders, self._profile.extruder
-        upper, pressure = self._rig.upper, _pressure(found, extruder)
+        upper, pressure = self._rig.upper, float(self._rig.air.law.pressure(np.array(found.flow)))
         fast = upper.slope * found.speed
         hard = upper.slope * found.acceleration + upper.bend * found.speed**2
         slack = 1 + ROUNDING
@@ -80,7 +79,7 @@ class Survey:
             and found.acceleration <= limits.acceleration_max * slack
             and hard + self._rig.bend * fast**2 <= sliders.acceleration_max * slack
             and found.jerk <= limits.jerk_max * slack
-            and max(pressure, found.air) <= extruder.pressure_max
+            and max(pressure, found.air) <= extruder.pressure_max * slack
             and bool(on_bed(leg.segments.points, self._profile).all())
         )
 
@@ -96,10 +95,6 @@ class Survey:
         margin = rig.upper.slope * SPACING
         held = (travel >= sliders.travel_min + margin) & (travel <= sliders.travel_max - margin)
         return np.asarray(pulled.all(axis=1) & held.all(axis=1), dtype=np.bool_)
-
-
-def _pressure(found: LegBounds, extruder: Extruder) -> float:
-    return extruder.pressure_threshold + extruder.pressure_slope * found.flow
 
 
 def _affine(rig: Rig, q: Array, place: Array) -> tuple[Array, Array, Array]:

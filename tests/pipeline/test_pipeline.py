@@ -92,7 +92,6 @@ def test_pause_comes_after_everything_up_to_rest(paper):
         (b"G1 Z-1 F1200\n", "bed", 0.0, 1),
         (b"G1 Z900 F1200\n", "bed", 800.0, 1),
         (b"G1 X300 F1200\n", "force", 12.0, 1),
-        (b"M83\nG1 X100 E5000 F1200\n", "pressure", 200.0, 2),
     ],
 )
 def test_what_the_machine_cannot_do_is_named_with_line_number_and_limit(paper, text, kind, limit, line):
