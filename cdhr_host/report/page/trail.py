@@ -10,7 +10,7 @@ from cdhr_host.motion.smooth_path import norms
 from cdhr_host.pipeline import Checked
 from cdhr_host.profile import Profile
 from cdhr_host.report.page.places import place_of
-from cdhr_host.report.page.thinning import thinned
+from cdhr_host.report.thinning import Thinner
 from cdhr_host.units import MM
 from cdhr_host.values import Array, Flags
 
@@ -20,8 +20,6 @@ STEPPED: Final = [COLUMNS.index("flow"), COLUMNS.index("line")]
 """columns that have no values in between: those of a segment are its end's"""
 BUDGET: Final = 300_000
 """vertices a page holds at most"""
-CHUNK: Final = 50_000
-"""vertices gathered before they are thinned"""
 TOLERANCE: Final = 0.02 * MM
 """m a drawn path may be off to begin with"""
 SHADE: Final = 0.01
@@ -39,36 +37,28 @@ class Trail:
     """
 
     def __init__(self, profile: Profile, budget: int = BUDGET) -> None:
-        self._profile, self._budget = profile, budget
+        self._profile = profile
         self._windows = Windows.from_profile(profile)
         self._last: Array | None = None
-        self._gathered: list[Array] = []
-        self._thin: list[Array] = []
-        self._coarser = 1.0
+        self._thinner = Thinner(_scale(profile), _laying, budget)
         self.places: dict[tuple[int | None, str | None], Array] = {}
         """of problems, by line and key: (3,) m, ``_G``"""
 
     @property
     def tolerance(self) -> float:
         """m: how far the drawn path is from the planned one at most."""
-        return TOLERANCE * self._coarser
+        return TOLERANCE * self._thinner.coarser
 
     def watch(self, checked: Checked) -> None:
         """Take in a block."""
         for problem in checked.problems:
             self.places[problem.line, problem.key] = place_of(problem, checked)
-        if not len(checked.track.tick):
-            return
-        self._gathered.append(self._filled(checked))
-        if sum(map(len, self._gathered)) >= CHUNK:
-            self._settle()
+        if len(checked.track.tick):
+            self._thinner.add(self._filled(checked))
 
     def vertices(self) -> Array:
         """(M, 9) of COLUMNS, M at most the budget; float32."""
-        self._settle()
-        while self._thin and len(rows := self._whole()) > self._budget:
-            self._coarsen(rows)
-        return self._whole() if self._thin else np.zeros((0, len(COLUMNS)), dtype=np.float32)
+        return self._thinner.vertices().astype(np.float32)
 
     def place(self, problem: Problem, rows: Array) -> Array | None:
         """(3,) m: where a problem is; the first vertex of its line where nothing nearer is known."""
@@ -99,25 +89,12 @@ class Trail:
             return float(rows.t[-1] / rows.tick[-1])
         return self._profile.drives.period
 
-    def _settle(self) -> None:
-        if self._gathered:
-            rows = np.concatenate(self._gathered)
-            self._thin.append(rows[thinned(rows, self._scale(), _laying(rows))])
-            self._gathered = []
-        if sum(map(len, self._thin)) > 2 * self._budget:
-            self._coarsen(self._whole())
 
-    def _coarsen(self, rows: Array) -> None:
-        self._coarser *= 2.0
-        self._thin = [rows[thinned(rows, self._scale(), _laying(rows))]]
-
-    def _whole(self) -> Array:
-        return np.concatenate(self._thin)
-
-    def _scale(self) -> Array:
-        limits, extruder = self._profile.limits, self._profile.extruder
-        shades = SHADE * np.array([limits.speed_max, 1.0, extruder.pressure_max])
-        return self._coarser * np.array([*[TOLERANCE] * 3, *shades, 0.0, 0.0, 0.0])
+def _scale(profile: Profile) -> Array:
+    """Tolerances of COLUMNS to begin with."""
+    limits, extruder = profile.limits, profile.extruder
+    shades = SHADE * np.array([limits.speed_max, 1.0, extruder.pressure_max])
+    return np.array([*[TOLERANCE] * 3, *shades, 0.0, 0.0, 0.0])
 
 
 def _laying(rows: Array) -> Flags:

@@ -70,6 +70,17 @@ class Study:
     """slow readings too, and the experiments to their end"""
 
 
+def known(said: str, chance: float = 0.0, share: float = 0.0) -> tuple[float | None, float]:
+    """The study's word -> its number and the tolerance: half its last digit, ``chance``, a share of it.
+
+    "-" says nothing.
+    """
+    if said == "-":
+        return None, 0.0
+    digit = 0.5 * 10.0 ** -len(said.partition(".")[2])
+    return float(said), digit + chance + share * float(said)
+
+
 def cells(
     names: str, paper: str, ours: Array, expected: str, *, unit: str, reading: str, tolerance: float
 ) -> tuple[Cell, ...]:

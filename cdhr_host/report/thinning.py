@@ -1,11 +1,16 @@
 """Fewer vertices that look the same: what a line between neighbours already says is left out."""
 
+from collections.abc import Callable
+from typing import Final
+
 import numpy as np
 
 from cdhr_host.values import Array, Flags, Ints
 
-PASSES = 8
+PASSES: Final = 8
 """each at most halves; the tolerances of all passes add up to less than one"""
+CHUNK: Final = 50_000
+"""vertices gathered before they are thinned"""
 
 
 def thinned(rows: Array, scale: Array, breaks: Flags) -> Ints:
@@ -21,6 +26,51 @@ def thinned(rows: Array, scale: Array, breaks: Flags) -> Ints:
     for turn in range(PASSES):
         kept = kept[~_spare(scaled[kept], breaks[kept], 2.0 ** (turn - PASSES))]
     return kept
+
+
+class Thinner:
+    """A polyline kept within a budget of vertices while it grows without end.
+
+    ``scale`` as for ``thinned``, to begin with; it doubles whenever twice the budget is held.
+    ``kinds`` tells the kind of each row; the dtype of the rows is kept.
+    """
+
+    def __init__(self, scale: Array, kinds: Callable[[Array], Flags], budget: int) -> None:
+        self._scale, self._kinds, self._budget = scale, kinds, budget
+        self._gathered: list[Array] = []
+        self._thin: list[Array] = []
+        self.coarser = 1.0
+        """how many times the tolerances to begin with"""
+
+    def add(self, rows: Array) -> None:
+        """Append (M, k) vertices."""
+        self._gathered.append(rows)
+        if sum(map(len, self._gathered)) >= CHUNK:
+            self._settle()
+
+    def vertices(self) -> Array:
+        """(M, k), M at most the budget; empty (0, k) where none came."""
+        self._settle()
+        while len(rows := self._whole()) > self._budget:
+            self._coarsen(rows)
+        return rows
+
+    def _settle(self) -> None:
+        if self._gathered:
+            self._thin.append(self._thinned(np.concatenate(self._gathered)))
+            self._gathered = []
+        if sum(map(len, self._thin)) > 2 * self._budget:
+            self._coarsen(self._whole())
+
+    def _coarsen(self, rows: Array) -> None:
+        self.coarser *= 2.0
+        self._thin = [self._thinned(rows)]
+
+    def _thinned(self, rows: Array) -> Array:
+        return rows[thinned(rows, self.coarser * self._scale, self._kinds(rows))]
+
+    def _whole(self) -> Array:
+        return np.concatenate(self._thin) if self._thin else np.zeros((0, len(self._scale)))
 
 
 def _spare(rows: Array, breaks: Flags, tolerance: float) -> Flags:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cdhr_host.report.page.thinning import thinned
+from cdhr_host.report.thinning import thinned
 
 
 def away(places, line):
