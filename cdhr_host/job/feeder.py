@@ -6,6 +6,7 @@ replace. It reaches the machine at once, however much the far side has buffered.
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -66,7 +67,7 @@ class Feeder:
 
     def begin(self, course: Course, rate: float, gain: Gain) -> None:
         """Play a course from the tick it begins at; the machine is at rest."""
-        first = course.staircase.tick
+        first = course.first
         if self.link.state in (LinkState.OPEN, LinkState.STOPPED):
             self.link.arm(self.slider)
             self._sent.clear()
@@ -80,6 +81,17 @@ class Feeder:
         """The machine is at rest and stays so."""
         self.link.stop()
         self.score, self.standing, self.stop = None, True, None
+
+    def drop(self) -> None:
+        """Nothing more is fed; what the link still plays is expected."""
+        self.score, self.standing, self.stop = None, True, None
+
+    @property
+    def settled(self) -> bool:
+        """Whether what was executed last was at a constant pace, or at rest."""
+        if self.score is None or self.last is None:
+            return True
+        return int(self.last.tick[0]) >= self.score.last.pace.settled
 
     def feed(self) -> None:
         """Feed what there is credit for."""
@@ -147,9 +159,12 @@ class Feeder:
         if self.score is None:
             return
         first = self._changeable()
+        if self.standing and first >= self.next_tick:
+            self.score = replace(self.score, gain=Gain(share, share))
+            return
         now = float(self.score.gain.at(np.array([first]))[0])
         gain = Gain(now, share, first, max(1, round(FLOW_TIME / self.period)))
-        self._replace(first, Score(self.score.staircase, self.score.parts, gain))
+        self._replace(first, replace(self.score, gain=gain))
 
     def place(self) -> tuple[Course, float, float] | None:
         """Course, time of its plan in ticks and rate of what was executed last."""

@@ -70,11 +70,13 @@ class Progress:
     """m³ laid so far, as planned"""
     total: float
     """m³ of the whole program"""
+    planned: float = 0.0
+    """s of the program as written that are done"""
 
     @property
     def fraction(self) -> float:
         """0 ... 1 by time."""
-        return min(1.0, max(0.0, 1.0 - self.left / self.duration)) if self.duration > 0.0 else 0.0
+        return min(1.0, max(0.0, self.planned / self.duration)) if self.duration > 0.0 else 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyint
 
 from cdhr_host.values import Array, ToolTrack
 
@@ -62,24 +63,29 @@ class Ramp:
     def at(self, t: Array) -> Beat:
         """(N,) ticks of this ramp -> playback at them."""
         scale = self._scale
-        z = (t - self.begin) / scale
-        powers = np.polynomial.polynomial
-        played = powers.polyval(z, powers.polyint(self.rate))
+        z: Array = (t - self.begin) / scale
         return Beat(
-            self.u + scale * played,
-            powers.polyval(z, self.rate),
-            powers.polyval(z, powers.polyder(self.rate)) / scale,
+            self.u + scale * _value(polyint(self.rate), z),
+            _value(self.rate, z),
+            _value(polyder(self.rate), z) / scale,
         )
 
     def bend(self, t: float) -> float:
         """1/tick² at a tick: change of the rate's change."""
         z = (t - self.begin) / self._scale
-        powers = np.polynomial.polynomial
-        return float(powers.polyval(z, powers.polyder(self.rate, 2)) / self._scale**2)
+        return float(_value(polyder(self.rate, 2), np.array([z]))[0] / self._scale**2)
 
     @property
     def _scale(self) -> float:
         return self.duration if math.isfinite(self.duration) else 1.0
+
+
+def _value(powers: Array, z: Array) -> Array:
+    """(K,) coefficients by ascending powers, (N,) -> (N,)."""
+    value = np.full(len(z), powers[-1])
+    for power in powers[-2::-1]:
+        value = value * z + power
+    return value
 
 
 def steady(begin: float, u: float, rate: float) -> Ramp:

@@ -111,7 +111,7 @@ class Ahead:
 def choices(
     ahead: Ahead, make: Make, first: int, change: float, *, waits: Sequence[float] = WAITS
 ) -> Iterator[Choice]:
-    """Paces from tick ``first`` on, best first: those that keep the limits, soonest settled; then the rest."""
+    """Paces from tick ``first`` on: those that keep the limits, soonest settled first; then the rest."""
     period, profile = ahead.profile.drives.period, ahead.profile
     least = bound(profile, *ahead.speeds, max(change, 1e-3)) / period
     begins = sorted({round(share * turning_time(profile) / period) for share in waits})

@@ -71,7 +71,8 @@ class Course:
         self.stops: deque[Stop] = deque()
         self._blocks: deque[Setpoints] = deque()
         self._waiting: deque[Iterator[Checked]] = deque()
-        self._first_wanted = staircase.tick
+        self.first = staircase.tick
+        """the first tick of it"""
 
     @property
     def over(self) -> bool:
@@ -88,6 +89,18 @@ class Course:
         while not self._over and self.staircase.tick <= until:
             if next(self._steps, None) is None:
                 self._over = True
+
+    def close(self) -> None:
+        """Read no further; what was read stays in force for the machine's next lines."""
+        modal = self.staircase.modal
+        self._tape.close()
+        self.staircase.restore(modal)
+
+    def moves(self) -> bool:
+        """Whether a short text has any motion in it."""
+        while not self._over and self.staircase.tick == self.first:
+            self.plan(self.first)
+        return self.staircase.tick > self.first
 
     def rows(self, first: int, last: int) -> Setpoints:
         """The dry run's rows of ticks first to last - 1. Raises MotionError for what cannot be done."""
@@ -151,7 +164,7 @@ class Course:
         cause = self.placed_at(u).cause
         machine = next(machine for at, machine in reversed(self._marks) if at == cause)
         other = Course(machine.fork(override), self._tape, at=cause, opens=False, ends=self._ends)
-        other._first_wanted = machine.tick
+        other.first = machine.tick
         return other
 
     def _planned(self, *, opens: bool) -> Iterator[object]:
@@ -187,7 +200,7 @@ class Course:
             return
         for first in range(step.ticks.start, step.ticks.stop, BLOCK):
             last = min(first + BLOCK, step.ticks.stop)
-            if last > self._first_wanted:
+            if last > self.first:
                 yield self.staircase.checked(step.track(np.arange(first, last)))
 
     def _computed(self) -> Setpoints:

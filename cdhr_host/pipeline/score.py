@@ -8,6 +8,7 @@ the ticks of the drives: its copies are delayed in time, not in the plan.
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -190,4 +191,4 @@ def _runs(part: Part, beat: Beat) -> list[slice]:
     """Ticks cut where shifts begin and end."""
     edges = part.course.shift_edges()
     cuts = sorted({0, len(beat.u), *np.searchsorted(beat.u, edges).tolist()})
-    return [slice(a, b) for a, b in zip(cuts, cuts[1:], strict=False)]
+    return [slice(a, b) for a, b in pairwise(cuts)]

@@ -1,7 +1,7 @@
 """Commands of one reading of a text, kept while someone may still have to plan them again."""
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 
 from cdhr_host.values import Command
 
@@ -25,6 +25,12 @@ class Tape:
                 self._kept.append(command)
         place = index - self._first
         return self._kept[place] if place < len(self._kept) else None
+
+    def close(self) -> None:
+        """Read no further."""
+        self._over = True
+        if isinstance(self._commands, Generator):
+            self._commands.close()
 
     def forget(self, before: int) -> None:
         """Commands below this number are not asked for any more."""

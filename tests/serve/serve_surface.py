@@ -126,7 +126,7 @@ class ScriptedSurface:
         total = float(self.lines_in_program)
         progress = Progress(
             self._name, self.lines_in_program, line, int(size * line / max(total, 1)), size, 1, 2,
-            float(line), float(line), total - line, total, line * 1e-9, total * 1e-9,
+            float(line), float(line), total - line, total, line * 1e-9, total * 1e-9, float(line),
         )  # fmt: skip
         self._status = replace(self._status, progress=progress, line=line)
 

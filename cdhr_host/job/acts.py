@@ -1,0 +1,221 @@
+"""What a printer's words set going, and what follows when something has come to rest."""
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from contextlib import suppress
+
+from cdhr_host.drives.clock import Clock
+from cdhr_host.drives.link import LinkState
+from cdhr_host.drives.rows import joined
+from cdhr_host.errors import CdhrError, JobError, Problem
+from cdhr_host.job.player import Kind, Player, Rest
+from cdhr_host.job.program import Program
+from cdhr_host.job.reading import Count, Reader, Seen
+from cdhr_host.job.states import MOVING, Word
+from cdhr_host.job.surface import JobState, Status
+from cdhr_host.job.telling import Telling
+from cdhr_host.units import MM
+from cdhr_host.values import Feedback, Setpoints
+
+LIFTS = (20.0 * MM, 10.0 * MM, 5.0 * MM)
+"""m, tried in this order after an abort"""
+Happen = Callable[[Word, str], None]
+
+
+class Acts:
+    """Everything here runs in the printer's thread, but for the checks and ``status``."""
+
+    def __init__(self, player: Player, clock: Clock, telling: Telling, happened: Happen) -> None:
+        self.player = player
+        self.message = ""
+        self._clock = clock
+        self._telling = telling
+        self._happened = happened
+        self._reader = Reader(player.profile)
+        self._program: Program | None = None
+        self._count: Count | None = None
+        self._seen = Seen()
+        self._over = False
+        player.observers.append(self._executed)
+
+    @property
+    def busy(self) -> bool:
+        """Whether the machine moves or is to move."""
+        return self.player.busy or self.player.link.state is LinkState.STOPPING
+
+    def status(self, state: JobState) -> Status:
+        """As of the last turn."""
+        player, count = self.player, self._count
+        now = self._clock.now()
+        progress = count.progress(now, player.feed, over=state is JobState.DONE) if count else None
+        return self._reader.status(
+            state,
+            self.message,
+            self._seen,
+            overrides=(player.feed, player.gain),
+            homed=player.homed,
+            referenced=player.link.state is not LinkState.CLOSED,
+            buffered=player.feeder.buffered,
+            progress=progress,
+        )
+
+    def forget(self) -> None:
+        """Another program is on its way."""
+        self._program = self._count = None
+
+    def unload(self) -> None:
+        """No program, and no clay on the bed."""
+        self.forget()
+        self.player.cleared()
+
+    def proven(self, found: "Future[Program]") -> None:
+        """A proof has ended."""
+        try:
+            program = found.result()
+        except CdhrError as error:
+            self._refused(error.problems, error.total)
+            return
+        if not program.proof.ok:
+            self._refused(program.proof.problems, program.proof.total_problems)
+            return
+        for warning in program.proof.warnings:
+            self._telling.add("message", warning.message, warning)
+        self._program = program
+        self._count = Count(program, self._clock.now())
+        self._happened(Word.PROVEN, f"{program.file.name} can be printed")
+
+    def check_start(self) -> None:
+        """Raises JobError where no print can begin."""
+        if not self.player.homed:
+            self.player.refuse_start()
+        if self.player.busy:
+            raise JobError(Problem("busy", "the machine still moves", hint="wait until it stands"))
+
+    def start(self) -> None:
+        """Begin the program."""
+        assert self._program is not None
+        self._count = Count(self._program, self._clock.now())
+        self.player.print(self._program)
+
+    def hold(self) -> None:
+        """Come to rest on the path."""
+        self.player.hold()
+
+    def check_resume(self) -> None:
+        """Raises JobError where a print cannot go on yet."""
+        if self.player.kind not in {None, Kind.PROGRAM}:
+            raise JobError(Problem("busy", "the machine still moves", hint="wait until it stands"))
+
+    def resume(self) -> None:
+        """Back to speed on the path."""
+        self.player.go_on()
+
+    def abort(self) -> None:
+        """Come to rest; the lift follows."""
+        if self.player.kind is Kind.PROGRAM:
+            self.player.hold()
+
+    def emergency_stop(self) -> None:
+        """The link's own stop."""
+        self.player.link.stop()
+
+    def acknowledge(self) -> None:
+        """A link that tripped is opened again; the machine stands where it is."""
+        link = self.player.link
+        if link.state is LinkState.FAULT:
+            link.close()
+        if link.state is LinkState.CLOSED:
+            link.open()
+        self.player.over()
+
+    def check_override(self, flow: float | None) -> None:
+        """Raises JobError for a flow that the air cannot give."""
+        if self._program is not None and flow is not None:
+            self.player.check_flow(flow, self._program.proof)
+
+    def override(self, feed: float | None, flow: float | None, state: JobState) -> None:
+        """Other shares from now on."""
+        self.player.override(feed, flow, moving=state in {JobState.PRINTING, JobState.RESUMING})
+        told = [
+            f"{what} {share:.0%}" for what, share in (("feed", feed), ("flow", flow)) if share is not None
+        ]
+        self._telling.add("override", ", ".join(told))
+
+    def fail(self, error: CdhrError) -> None:
+        """A fault: the machine comes to rest by its link, and stands until somebody has seen to it."""
+        for problem in error.problems:
+            self._telling.add("problem", problem.message, problem)
+        self._happened(Word.FAIL, error.problems[0].message)
+        with suppress(CdhrError):
+            self.player.link.stop()
+        self.player.give_up()
+
+    def end(self) -> None:
+        """Bring the machine to rest for good."""
+        with suppress(CdhrError):
+            self.player.link.stop()
+        while self.player.link.state is LinkState.STOPPING:
+            self._clock.wait_until(self._clock.now() + self.player.profile.drives.period)
+            with suppress(CdhrError):
+                self.player.collect()
+
+    def turn(self, state: JobState) -> None:
+        """Feed, collect, and what follows from it."""
+        if state is JobState.FAULT:
+            with suppress(CdhrError):
+                self.player.collect()
+            return
+        rest = self.player.turn()
+        if self._count is not None:
+            self._count.plan = self.player.plan_time(self._count.plan)
+        if rest is None:
+            if state is JobState.RESUMING and self.player.up_to_speed:
+                self._happened(Word.UP, "")
+        elif rest.kind is Kind.PROGRAM:
+            self._rested(rest, state)
+        elif rest.kind is Kind.LIFT:
+            self.player.over()
+            self._happened(Word.LIFTED, self.message)
+
+    def _rested(self, rest: Rest, state: JobState) -> None:
+        """The program stands."""
+        if rest.stop is not None and rest.stop.pause is None:
+            self.player.over()
+            if state is JobState.STOPPING:
+                self._happened(Word.LIFTED, "")
+            self._happened(Word.FINISHED, "")
+        elif state is JobState.STOPPING:
+            self._lift()
+        elif rest.stop is not None and state in MOVING:
+            assert rest.stop.pause is not None
+            message = rest.stop.pause.message
+            self._telling.add("pause", f"line {rest.stop.pause.line}: {message}")
+            self._happened(Word.PAUSED, message)
+        elif state is JobState.HOLDING:
+            self._happened(Word.RESTED, self.message)
+
+    def _lift(self) -> None:
+        """After an abort: up and away from the clay, if that can be done."""
+        self.player.over()
+        height = self.player.lift(LIFTS)
+        if not height:
+            text = "no way straight up is free: the nozzle stays where it stopped"
+            self._telling.add("message", text)
+            self._happened(Word.LIFTED, text)
+
+    def _executed(self, rows: Setpoints, feedback: Feedback) -> None:
+        before = self._seen.rows
+        last = rows[-2:] if len(rows) > 1 or before is None else joined([before[-1:], rows])
+        self._seen = Seen(last, feedback)
+        if self.player.kind is Kind.PROGRAM and self._count is not None:
+            layer = self._count.program.layer(self._count.line)
+            self._count.add(rows, self.player.profile.drives.period)
+            if (now := self._count.program.layer(self._count.line)) != layer:
+                self._telling.add("layer", f"layer {now} of {len(self._count.program.proof.layers)}")
+
+    def _refused(self, problems: tuple[Problem, ...], total: int) -> None:
+        for problem in problems:
+            self._telling.add("problem", problem.message, problem)
+        self._happened(
+            Word.REFUSED, f"refused: {problems[0].message}" + (f" and {total - 1} more" if total > 1 else "")
+        )

@@ -1,0 +1,224 @@
+"""One machine under a job: programs, typed G-code, jogs and lifts, played one after the other."""
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Final
+
+import numpy as np
+
+from cdhr_host.drives.link import MachineLink
+from cdhr_host.errors import JobError, MotionError, Problem
+from cdhr_host.job.feeder import Feeder
+from cdhr_host.job.program import Program
+from cdhr_host.pipeline import Proof, Staircase
+from cdhr_host.pipeline.course import Course, Stop
+from cdhr_host.pipeline.score import Gain
+from cdhr_host.pipeline.tape import Tape
+from cdhr_host.units import KPA, MINUTE, MM
+from cdhr_host.values import Feedback, Setpoints
+
+AHEAD: Final = 1 << 20
+"""ticks: more than any typed text has"""
+REFERENCE: Final = 50e-6
+"""m from the reference pose that count as standing there"""
+Observer = Callable[[Setpoints, Feedback], None]
+
+
+class Kind(Enum):
+    """What is being played."""
+
+    PROGRAM = "program"
+    TYPED = "typed"
+    LIFT = "lift"
+
+
+@dataclass(frozen=True, slots=True)
+class Rest:
+    """Something played has come to rest, and all of it was executed."""
+
+    kind: Kind
+    stop: Stop | None
+    """the stop of the plan this is; None where a hold brought it to rest"""
+
+
+class Player:
+    """What moves the machine. Not to be called from more than one thread."""
+
+    def __init__(self, link: MachineLink) -> None:
+        self.link = link
+        self.profile = link.profile
+        self.feeder = Feeder(link)
+        self.staircase = Staircase(link.profile)
+        self.kind: Kind | None = None
+        self._course: Course | None = None
+        self.feed = 1.0
+        self.gain = 1.0
+        self.executed: tuple[Setpoints, Feedback] | None = None
+        """the last batch"""
+        self.observers: list[Observer] = []
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is being played, at rest or not."""
+        return self.kind is not None
+
+    @property
+    def homed(self) -> bool:
+        """Whether it stands at the reference pose."""
+        return bool(np.abs(self.feeder.slider).max() <= REFERENCE)
+
+    @property
+    def up_to_speed(self) -> bool:
+        """Whether what was executed last was at a constant pace."""
+        return self.feeder.settled
+
+    def refuse_start(self) -> None:
+        """Raises JobError: a program begins at the reference pose only."""
+        raise JobError(_not_homed())
+
+    def plan_time(self, before: float) -> float:
+        """s of the program as written that are done; ``before`` if that is not known."""
+        place = self.feeder.place() if self.kind is Kind.PROGRAM else None
+        return before if place is None else place[1] * self.profile.drives.period
+
+    def check_flow(self, share: float, proof: Proof) -> None:
+        """Raises JobError where the air cannot give this share of the flow a program needs."""
+        extruder = self.profile.extruder
+        most = proof.extremes["pressure_kpa"][2] * KPA if "pressure_kpa" in proof.extremes else 0.0
+        needed = extruder.pressure_threshold + share * (most - extruder.pressure_threshold)
+        if most > extruder.pressure_threshold and needed > extruder.pressure_max:
+            room = (extruder.pressure_max - extruder.pressure_threshold) / (
+                most - extruder.pressure_threshold
+            )
+            raise JobError(
+                Problem(
+                    "override",
+                    f"a flow of {share:.0%} would need {needed / KPA:.4g} kPa, the air gives "
+                    f"{extruder.pressure_max / KPA:.4g} kPa",
+                    value=needed / KPA,
+                    limit=extruder.pressure_max / KPA,
+                    unit="kPa",
+                    hint=f"this program can have {math.floor(room * 100)} % at most",
+                )
+            )
+
+    def cleared(self) -> None:
+        """The part was taken off: nothing stands in the way of G28."""
+        self.staircase.restore(replace(self.staircase.modal, top=-math.inf, near=math.inf))
+
+    def give_up(self) -> None:
+        """A fault: what is played is not gone on with."""
+        self.feeder.drop()
+        self._close()
+        self.kind = self._course = None
+
+    def _close(self) -> None:
+        if self._course is not None:
+            self._course.close()
+
+    def turn(self) -> Rest | None:
+        """Feed and collect once; what has come to rest. Raises DriveError, MotionError, ProgramError."""
+        self.feeder.feed()
+        self.collect()
+        if self.kind is not None and self.feeder.at_rest:
+            return Rest(self.kind, self.feeder.stop)
+        return None
+
+    def collect(self) -> None:
+        """Take what was executed and hand it on."""
+        for rows, feedback in self.feeder.collect():
+            self.executed = rows, feedback
+            for observer in self.observers:
+                observer(rows, feedback)
+
+    def print(self, program: Program) -> None:
+        """Begin a program; the machine stands at the reference pose. Raises JobError if it does not."""
+        if not self.homed:
+            raise JobError(_not_homed())
+        self.staircase = Staircase(self.profile, rig=self.staircase.rig)
+        commands = self.staircase.commands(program.file.chunks())
+        course = Course(self.staircase.fork(), Tape(commands))
+        self._play(Kind.PROGRAM, course, min(self.feed, 1.0))
+
+    def typed(self, text: str, kind: Kind = Kind.TYPED) -> bool:
+        """Prove a short text, then begin it; whether anything is to move.
+
+        Refused text leaves the machine as it was. Raises ProgramError, MotionError.
+        """
+        course = self._proven(self.staircase, [text.encode()])
+        if not course.moves():
+            return False
+        self._play(kind, course, 1.0)
+        return True
+
+    def lift(self, heights: Iterable[float]) -> float:
+        """Begin to go straight up by the first of these heights, m, that can be done; 0 if none can."""
+        speed = self.profile.limits.speed_max / 2 / MM * MINUTE
+        for height in heights:
+            text = f"G91\nG1 Z{height / MM:.6f} F{speed:.3f}\n"
+            try:
+                course = self._proven(self.staircase.apart(), [text.encode()])
+            except MotionError:
+                continue
+            self._play(Kind.LIFT, course, 1.0)
+            return height
+        return 0.0
+
+    def over(self) -> None:
+        """What is played has come to rest, and is given up or done; stand there."""
+        self._close()
+        ended = self.feeder.stop is not None and self.feeder.stop.pause is None
+        self.feeder.end()
+        if self.kind in (Kind.PROGRAM, Kind.TYPED) and ended and self._course is not None:
+            self.staircase = self._course.staircase
+        elif self.feeder.last is not None:
+            self.staircase.stand_at(self.feeder.last.nozzle_G[-1], self.feeder.last.upper[-1])
+        self.kind = self._course = None
+
+    def hold(self) -> None:
+        """Come to rest on the path."""
+        self.feeder.hold()
+
+    def go_on(self) -> None:
+        """From rest back to speed."""
+        self.feeder.go_on(min(self.feed, 1.0))
+
+    def override(self, feed: float | None, flow: float | None, *, moving: bool) -> None:
+        """Other shares of feed and flow, at once while a program moves."""
+        if feed is not None:
+            self.feed = feed
+            if moving:
+                self.feeder.pace(min(feed, 1.0))
+        if flow is not None:
+            self.gain = flow
+            self.feeder.flow(flow)
+
+    def _play(self, kind: Kind, course: Course, rate: float) -> None:
+        share = self.gain if kind is Kind.PROGRAM else 1.0
+        self.feeder.begin(course, rate, Gain(share, share))
+        self.kind, self._course = kind, course
+
+    def _proven(self, machine: Staircase, chunks: list[bytes]) -> Course:
+        """A course of a short text, looked at tick by tick; the machine's modal state goes on."""
+        before = machine.modal
+        commands = list(machine.commands(chunks))
+        try:
+            trial = Course(machine.fork(), Tape(iter(commands)))
+            trial.plan(AHEAD)
+            first, last = machine.tick, trial.staircase.tick
+            if last > first:
+                trial.rows(first, last)
+        except BaseException:
+            machine.restore(before)
+            raise
+        return Course(machine.fork(), Tape(iter(commands)))
+
+
+def _not_homed() -> Problem:
+    return Problem(
+        "reference",
+        "the machine does not stand at its reference pose, where every program begins",
+        hint="send G28 first",
+    )
