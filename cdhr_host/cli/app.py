@@ -13,6 +13,7 @@ from cdhr_host.cli import (
     jog,
     profiles,
     reproduce,
+    serve,
     sim,
     stream,
     workspace,
@@ -41,6 +42,7 @@ app.command("stream", epilog=stream.EXAMPLES)(stream.stream)
 app.command("dry-run", epilog=dry_run.EXAMPLES)(dry_run.dry_run)
 app.command("jog", epilog=jog.EXAMPLES)(jog.jog)
 app.command("sim", epilog=sim.EXAMPLES)(sim.sim)
+app.command("serve", epilog=serve.EXAMPLES)(serve.serve)
 app.add_typer(profiles.app, name="profile")
 app.add_typer(drives.app, name="drives")
 app.command("compensation", epilog=compensation.EXAMPLES)(compensation.compensation)

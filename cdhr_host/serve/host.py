@@ -145,6 +145,9 @@ class Host:
         if status.state is not JobState.READY:
             problems = tuple(self._problems) or (Problem("program", status.message or f"{name} is refused"),)
             raise JobError(problems)
+        if not status.homed:
+            self.say("echo: going to the reference pose first")
+            await self.run("G28")
         self.surface.start()
 
     async def until(self, reached: Callable[[JobState], bool]) -> Status:

@@ -113,6 +113,7 @@ function showJob() {
   by("resume").disabled = job !== "held";
   by("cancel").disabled = !active;
   by("acknowledge").hidden = !halted;
+  by("taken").hidden = !["done", "stopped"].includes(job);
   by("halt").hidden = !halted;
   put("halt", halted ? `Halted: ${seen.webhooks.state_message}. Look at the machine before you acknowledge.` : "");
 }
@@ -128,7 +129,7 @@ function showFactors() {
 
 function cableRow(name) {
   const row = document.createElement("li");
-  row.innerHTML = '<span class="name"></span><div class="gauge" role="meter"><div class="band"></div><div class="bar"></div><div class="mark" hidden></div></div><span class="value"></span>';
+  row.innerHTML = '<span class="name"></span><div class="gauge" role="meter"><div class="band"></div><div class="bar"></div></div><span class="value"></span>';
   row.querySelector(".name").textContent = name;
   row.querySelector(".gauge").setAttribute("aria-label", `cable ${name}`);
   return row;
@@ -147,10 +148,9 @@ function showCables() {
     row.classList.toggle("out", force < low || force > high);
     row.querySelector(".value").textContent = `${fixed(force, 2)} N`;
     for (const [key, value] of [["valuenow", force], ["valuemin", 0], ["valuemax", fixed(most)], ["valuetext", `${fixed(force, 2)} newton, allowed ${fixed(low)} to ${fixed(high)}`]]) gauge.setAttribute(`aria-${key}`, value);
-    const measured = i < 6 && i % 2 === 0 ? force_n[i / 2] : null, mark = row.querySelector(".mark");
-    mark.hidden = measured == null;
-    if (measured != null) mark.style.left = percent(measured / 2);
   });
+  const known = force_n.some((force) => force != null);
+  put("measured", known ? `Measured: ${force_n.map((force, i) => `pair ${i + 1} ${fixed(force, 2)} N`).join(", ")}.` : "No force sensors.");
 }
 
 function showAir() {
@@ -217,6 +217,7 @@ by("cancel").onclick = () => {
   if (sure) order("printer.print.cancel");
   else setTimeout(() => { button.dataset.sure = ""; button.textContent = "Cancel print"; }, 4000);
 };
+by("taken").onclick = () => script("SDCARD_RESET_FILE");
 by("acknowledge").onclick = () => order("printer.firmware_restart");
 for (const [id, word] of [["feed", "M220"], ["flow", "M221"]]) {
   by(id).oninput = () => { dragging = id; put(`${id}-shown`, `${by(id).value} %`); };
