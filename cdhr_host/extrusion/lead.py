@@ -71,7 +71,7 @@ class AirStage(Generic[R]):
         self._period = period
         self._keep = float(np.exp(-period / model.regulator_lag)) if model.regulator_lag > 0.0 else 0.0
         self._open, self._close = ticks(model.open_dead, period), ticks(model.close_dead, period)
-        self._gaps = Gaps(ticks(model.restore, period), ticks(model.gap, period))
+        self._gaps = Gaps(*(ticks(each, period) for each in (model.restore, model.gap, model.lag)))
         coasting = ticks(COASTING, period) if model.coast > 0.0 else 0
         self._ahead = self._gaps.longest + max(self._close - self._open, 0) + coasting + 2
         self.lead = max(self._open, self._close) + self._ahead if model.leads else 0
@@ -126,7 +126,9 @@ class AirStage(Generic[R]):
         count = end - past.end
         if count <= 0:
             return
-        plan = wanted(flow[past.end - int(rows.tick[0]) :], past.since, self._model.law, self._gaps)
+        plan = wanted(
+            flow[past.end - int(rows.tick[0]) :], past.since, self._model.law, self._model.creep, self._gaps
+        )
         level, reached = np.zeros(count), np.zeros(count)
         kind, regulator = self._kinds(plan)[:count], self._regulator(plan)[:count]
         cuts = [0, *(np.flatnonzero(np.diff(kind)) + 1).tolist(), count]

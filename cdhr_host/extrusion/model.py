@@ -19,6 +19,8 @@ RESTORE: Final = 3.0
 """lags over which the pressure is restored to the clay's yield before a bead"""
 RESERVE: Final = 0.15
 """of the greatest pressure, kept for changing the flow where the air is led"""
+CREEP: Final = 2e-4
+"""m/s at which clay may leave the nozzle just before a bead: a paste's pressure rises steepest at rest"""
 SETTLE: Final = 0.05
 """s a valve stays closed at least: shorter gaps between two beads are passed at yield"""
 
@@ -38,6 +40,8 @@ class AirModel:
     """s"""
     close_dead: float = 0.0
     """s"""
+    creep: float = 0.0
+    """m³/s that may flow as a bead begins"""
     coast: float = 0.0
     """m before the end of a bead from which on the clay in the line is left to run out"""
 
@@ -55,6 +59,7 @@ class AirModel:
             clay.line_lag,
             clay.open_dead,
             clay.close_dead,
+            CREEP * math.pi / 4.0 * extruder.nozzle_diameter**2,
             extruder.coast,
         )
 

@@ -2,7 +2,9 @@
 
 While clay flows the pressure is that of its law. In short gaps between two beads (a corner
 taken at rest) it stays at the clay's yield, where nothing flows; in longer ones the air is shut,
-the pressure bleeds, and a smooth ramp restores it to the yield just before the next bead.
+the pressure bleeds, and a smooth ramp restores it to the yield just before the next bead. In the
+last moments before a bead it rises on to where the clay creeps: a paste needs most of its
+pressure for its first flow.
 """
 
 from dataclasses import dataclass
@@ -13,6 +15,8 @@ import numpy as np
 from cdhr_host.extrusion.rheology import PressureFlow
 from cdhr_host.values import Array, Flags, Ints
 
+RISING: Final = 4
+"""power of time by which the pressure nears creeping, so that it goes on rising as steeply with the bead"""
 NEVER: Final = 2**40
 """ticks: further than any program is long"""
 
@@ -25,6 +29,8 @@ class Gaps:
     """length of the ramp before a bead"""
     longest: int
     """a gap up to this long is passed at yield"""
+    creeps: int
+    """length of the rise from the clay's yield to where it creeps"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,21 +45,33 @@ class Wanted:
     """(N,) ticks since clay flowed last; 0 while it flows"""
 
 
-def wanted(flow: Array, since: int, law: PressureFlow, gaps: Gaps) -> Wanted:
+def wanted(flow: Array, since: int, law: PressureFlow, creep: float, gaps: Gaps) -> Wanted:
     """(N,) m³/s, all that is known, and ticks ``since`` the row before these flowed last.
 
-    Rows further than ``gaps.longest`` from the end do not depend on what may follow.
+    ``creep`` is the flow, m³/s, at which a bead may begin and end. Rows further than ``gaps.longest``
+    from the end do not depend on what may follow.
     """
     flowing = flow > 0.0
     ago, ahead = _since(flowing, since), _until(flowing)
     short = ago + ahead - 1 <= gaps.longest
     near = ahead <= gaps.restore
-    z = np.clip(1.0 - ahead / max(gaps.restore, 1), 0.0, 1.0)
-    ramp = np.where(short, 1.0, z * z * (3.0 - 2.0 * z))
-    pressure = law.threshold * ramp
-    pressure[flowing] = law.pressure(flow[flowing])
+    ramp = np.where(short, 1.0, _eased(ahead, gaps.restore))
+    more = float(law.pressure(np.array(creep))) - law.threshold
+    pressure = law.threshold * ramp + more * _nearing(ahead, gaps.creeps) ** RISING
+    pressure[flowing] = law.pressure(np.maximum(flow[flowing], creep))
     opened = flowing | near | short
     return Wanted(np.where(opened, pressure, 0.0), opened, ago)
+
+
+def _eased(ahead: Ints, length: int) -> Array:
+    """(N,) ticks before a bead -> from 0, ``length`` ticks before it, smoothly to 1."""
+    z = _nearing(ahead, length)
+    return z * z * (3.0 - 2.0 * z)
+
+
+def _nearing(ahead: Ints, length: int) -> Array:
+    """(N,) ticks before a bead -> from 0, ``length`` ticks before it, to 1."""
+    return np.asarray(np.clip(1.0 - ahead / max(length, 1), 0.0, 1.0))
 
 
 def _since(flowing: Flags, before: int) -> Ints:

@@ -32,8 +32,6 @@ class FlowLimits:
     """(M,) m³/s, ascending"""
     change: Array = field(default_factory=_none)
     """(M,) m³/s², the greatest change of flow on the way to each of these and back to rest"""
-    second: float = 0.0
-    """s: a jerk j asks as much of the air as an acceleration of ``second`` · j"""
     rests: bool = False
     """whether the nozzle rests where the clay per metre changes"""
 
@@ -42,12 +40,11 @@ class FlowLimits:
         with np.errstate(divide="ignore"):
             return np.asarray(np.minimum(feed, np.where(clay > 0.0, self.greatest / clay, np.inf)))
 
-    def share(self, feed: Array, clay: Array, acceleration: float, jerk: float) -> Array:
-        """(M,) of both limits, m/s² and m/s³, that segments run at ``feed`` may use for their speed."""
+    def share(self, feed: Array, clay: Array, acceleration: float) -> Array:
+        """(M,) of the acceleration m/s², and of the jerk, that segments run at ``feed`` may use."""
         allowed = np.interp(clay * feed, self.flow, self.change)
-        asked = clay * (acceleration + self.second * jerk)
-        with np.errstate(divide="ignore"):
-            return np.asarray(np.minimum(1.0, np.where(clay > 0.0, allowed / asked, 1.0)))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.minimum(1.0, np.where(clay > 0.0, allowed / (clay * acceleration), 1.0)))
 
     def jumps(self, clay: Array, before: float) -> Flags:
         """(M,) whether the clay per metre changes where each segment begins; ``before`` them it was that."""

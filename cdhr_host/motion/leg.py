@@ -174,7 +174,7 @@ class LegPlanner:
     def _paces(self, segments: Segments) -> tuple[Array, Array]:
         """(M,) m/s wanted, (M,) share of acceleration and jerk that the air leaves for changing it."""
         limits, feed = self._limits, segments.wanted(self._override)
-        return feed, limits.flow.share(feed, segments.clay, limits.acceleration, limits.jerk)
+        return feed, limits.flow.share(feed, segments.clay, limits.acceleration)
 
     def _start(self, segments: Segments) -> None:
         """Begin at rest in time where the path begins straight, else at rest in s."""

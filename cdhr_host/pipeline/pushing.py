@@ -1,11 +1,12 @@
 """Clay and air as bounds on the motion: no flow and no change of flow that the pressure cannot make.
 
-A flow Q(t) needs of the regulator's input p(Q) + lag · p'(Q) Q' (and a term of second order
-where there are two lags), which must stay between 0 and the greatest pressure. So on the way
-between a tenth of a flow and all of it Q' is at most the room to either end over lag · dp/dQ;
-the last tenth, walked in a fraction of a millimetre, may lag behind.
+A flow Q(t) needs of the regulator's input p + (lag1 + lag2) p' + lag1 lag2 p'' with p = p(Q), and
+that must stay between 0 and the greatest pressure. So for a ladder of flows the hardest start
+from rest, and stop to rest, is sought that does: ramps of the flow with the machine's ratio of
+jerk to acceleration, of which all others are scaled.
 """
 
+import math
 from collections.abc import Iterator
 from typing import Final
 
@@ -20,29 +21,62 @@ from cdhr_host.motion.smooth_path import norms
 from cdhr_host.units import KPA, MM, MM3
 from cdhr_host.values import Arc, Array, Command, Ints, Moves, Notice, Prime, Spline
 
-GRID: Final = 48
-"""flows at which the greatest change is worked out"""
-WAY: Final = 0.1
-"""of a flow, from which on its change is bounded"""
-MARGIN: Final = 0.9
-"""of the room that is used"""
+GRID: Final = 24
+"""flows at which the hardest start is sought"""
+HALVINGS: Final = 16
+"""of the search, from HARDEST on"""
+HARDEST: Final = 1e3
+"""1/s: change of flow, of the flow, that nothing needs more than"""
+SAMPLES: Final = 400
+"""of a ramp"""
+SMOOTHED: Final = 0.02
+"""s over which the pressure of a ramp is averaged: what is shorter the clay does not show"""
+MARGIN: Final = 0.95
+"""of the pressure that is used"""
 SLACK: Final = 1.0 + 1e-9
 """a flow beyond its limit by less is rounding"""
 
 
-def flow_limits(air: AirModel) -> FlowLimits:
-    """What a model of clay and air lets the motion do."""
+def flow_limits(air: AirModel, steepness: float) -> FlowLimits:
+    """What a model of clay and air lets the motion do; ``steepness`` 1/s is jerk over acceleration."""
     greatest = air.flow_max
     if air.lag == 0.0 or greatest == 0.0:
         return FlowLimits(greatest, rests=air.leads)
     flow = greatest * np.arange(1, GRID + 1) / GRID
-    pressure = air.law.pressure(flow)
-    room = MARGIN * np.minimum(pressure, air.pressure_max - pressure)
-    possible = room / (air.lag * air.law.resistance(flow))
-    on_way = (flow[:, None] >= WAY * flow) & (flow[:, None] <= flow)
-    change = np.where(on_way, possible[:, None], np.inf).min(axis=0)
-    second = air.regulator_lag * air.line_lag / air.lag
-    return FlowLimits(greatest, flow, change, second, rests=True)
+    change = np.array([_hardest(air, each, steepness) for each in flow.tolist()])
+    return FlowLimits(greatest, flow, np.minimum.accumulate(change[::-1])[::-1], rests=True)
+
+
+def _hardest(air: AirModel, flow: float, steepness: float) -> float:
+    """m³/s²: the greatest change on the way from rest to a flow and back that the air can make."""
+    low, high = 0.0, HARDEST
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if _possible(air, flow, middle * flow, steepness) else (low, middle)
+    return low * flow
+
+
+def _possible(air: AirModel, flow: float, change: float, steepness: float) -> bool:
+    ramp, step = _ramp(flow, change, steepness)
+    window = max(1, math.ceil(SMOOTHED / step))
+    padded = np.concatenate((np.zeros(2 * window), ramp, np.full(2 * window, flow)))
+    pressure = air.law.pressure(np.maximum(padded, air.creep))
+    p = np.convolve(pressure, np.full(window, 1.0 / window), "valid")
+    first, second = np.gradient(p, step), np.gradient(np.gradient(p, step), step)
+    bent = p + air.regulator_lag * air.line_lag * second
+    up, down = bent + air.lag * first, bent - air.lag * first
+    return bool(up.max() <= MARGIN * air.pressure_max and down.min() >= 0.0)
+
+
+def _ramp(flow: float, change: float, steepness: float) -> tuple[Array, float]:
+    """(SAMPLES,) m³/s from rest to a flow, its change and the change of that bounded, and s a sample."""
+    jerk = change * steepness
+    rounded = min(1.0 / steepness, math.sqrt(flow / jerk))
+    whole = rounded + flow / (jerk * rounded)
+    t = np.linspace(0.0, whole, SAMPLES)
+    slope = jerk * np.minimum(np.minimum(t, rounded), whole - t)
+    step = whole / (SAMPLES - 1)
+    return np.concatenate(([0.0], np.cumsum((slope[1:] + slope[:-1]) / 2))) * step, step
 
 
 def lays(command: Command) -> bool:

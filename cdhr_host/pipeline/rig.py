@@ -59,7 +59,9 @@ class Rig:
 
     def limits(self) -> MotionLimits:
         """Limits of the nozzle that keep those of the sliders; raises MotionError where there are none."""
-        return MotionLimits.from_profile(self.profile, self.bend, self.upper, flow_limits(self.air))
+        limits = self.profile.limits
+        flow = flow_limits(self.air, limits.jerk_max / limits.acceleration_max)
+        return MotionLimits.from_profile(self.profile, self.bend, self.upper, flow)
 
     def follow(self, track: ToolTrack) -> tuple[Array, UpperMotion]:
         """(N, 3) m, the nozzle platform's displacement, and the upper platform's motion."""
