@@ -12,7 +12,7 @@ from cdhr_host.cli.options import Json, ProfileName, examples
 from cdhr_host.cli.refusals import Refusal, emit
 
 if TYPE_CHECKING:
-    from cdhr_host.drives.canopen.bus import Bus
+    from cdhr_host.drives.access import ObjectAccess
     from cdhr_host.drives.sender import SenderLink
 
 app = typer.Typer(
@@ -32,7 +32,7 @@ Object = Annotated[str, typer.Argument(metavar="INDEX[:SUB]", help="Object, such
 @app.command(epilog=examples("cdhr drives scan --drives slcan:/dev/ttyACM0@1000000"))
 def scan(*, drives: Url, json_: Json = False) -> None:
     """Every node that answers, with its identity."""
-    from cdhr_host.drives.canopen.commission import scan as scanned
+    from cdhr_host.drives.commission import scan as scanned
 
     with _bus(drives) as bus:
         nodes = scanned(bus)
@@ -51,7 +51,7 @@ def scan(*, drives: Url, json_: Json = False) -> None:
 @app.command(epilog=examples("cdhr drives status --drives slcan:/dev/ttyACM0@1000000"))
 def status(*, drives: Url, profile: ProfileName = "paper") -> None:
     """State, position and error of the six drives."""
-    from cdhr_host.drives.canopen.commission import status as statuses
+    from cdhr_host.drives.commission import status as statuses
     from cdhr_host.units import MM
 
     machine = open_machine(profile)
@@ -66,7 +66,7 @@ def status(*, drives: Url, profile: ProfileName = "paper") -> None:
 @app.command(epilog=examples("cdhr drives read 3 0x6065 --drives socketcan:can0"))
 def read(node: NodeId, object_: Object, *, drives: Url) -> None:
     """One object, with its name."""
-    from cdhr_host.drives.canopen.commission import read_object
+    from cdhr_host.drives.commission import read_object
 
     with _bus(drives) as bus:
         emit(read_object(bus, node, *_place(object_)))
@@ -81,7 +81,7 @@ def write(
     drives: Url,
 ) -> None:
     """Write one object and show what is read back."""
-    from cdhr_host.drives.canopen.commission import write_object
+    from cdhr_host.drives.commission import write_object
 
     with _bus(drives) as bus:
         emit(write_object(bus, node, *_place(object_), _number(value)))
@@ -90,7 +90,7 @@ def write(
 @app.command(epilog=examples("cdhr drives reset 3 --drives socketcan:can0"))
 def reset(node: NodeId, *, drives: Url) -> None:
     """Take a drive out of fault; it stays switched off."""
-    from cdhr_host.drives.canopen.commission import reset as cleared
+    from cdhr_host.drives.commission import reset as cleared
 
     with _bus(drives) as bus:
         emit(f"drive {node}: {cleared(bus, node).value}")
@@ -113,16 +113,17 @@ def home(*, drives: Url, profile: ProfileName = "paper") -> None:
 
 
 @contextmanager
-def _bus(url: str) -> "Iterator[Bus]":
+def _bus(url: str) -> "Iterator[ObjectAccess]":
     from cdhr_host.drives import MonotonicClock
-    from cdhr_host.drives.canopen.commission import connect
+    from cdhr_host.drives.access import connect
 
-    _real(url)
+    if url.partition(":")[0] in ("loopback", ""):
+        raise Refusal(f"cdhr: error: '{url}' has no drives to look at\nhint: --drives slcan:PATH@BITRATE")
     bus = connect(url, MonotonicClock())
     try:
         yield bus
     finally:
-        bus.port.close()
+        bus.close()
 
 
 @contextmanager

@@ -4,7 +4,7 @@ import pytest
 from bench import Bench
 from trajectories import PAPER
 
-from cdhr_host.drives.canopen import commission
+from cdhr_host.drives import commission
 from cdhr_host.drives.canopen.bus import Bus
 from cdhr_host.drives.canopen.cia402 import State
 from cdhr_host.drives.canopen.load import bus_load, bus_share, frame_bits

@@ -22,7 +22,7 @@ from cdhr_host.errors import DriveError
 from cdhr_host.job import stream
 from cdhr_host.motion.hold import path_true_stop
 from cdhr_host.plant import Machine
-from cdhr_host.values import Feedback, Setpoints
+from cdhr_host.values import Setpoints
 
 ROOT = Path(__file__).resolve().parents[2]
 ZERO = np.zeros(6)
@@ -96,7 +96,6 @@ def test_rows_survive_the_ring():
     again = feedback(packed(executed, FEEDBACK))
     assert (again.counts == executed.counts).all()
     assert again.counts.dtype == np.int64
-    assert width(FEEDBACK, Feedback) == 29
 
 
 def test_run_through_the_sender_is_received_tick_by_tick(tmp_path):

@@ -24,7 +24,10 @@ class Type(IntEnum):
     DISARM = 0x13
     FAULT_RESET = 0x14
     KEEPALIVE = 0x15
+    RATE = 0x16
     REVISE = 0x17
+    OD_READ = 0x20
+    OD_WRITE = 0x21
     HELLO_ACK = 0x81
     CONFIG_ACK = 0x82
     CLOCK = 0x83
@@ -32,6 +35,8 @@ class Type(IntEnum):
     FAULT = 0x92
     EXECUTED = 0x93
     NAK = 0x94
+    OD_READ_ACK = 0xA0
+    OD_WRITE_ACK = 0xA1
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,11 +19,17 @@ CONFIG_END: Final = struct.Struct("<HHHHH")
 ARM: Final = struct.Struct("<I6i")
 SETPOINTS: Final = struct.Struct("<IBBBB")
 TICK: Final = struct.Struct("<6i6hHH")
-STATUS: Final = struct.Struct("<IIIHHBBHBx")
+STATUS: Final = struct.Struct("<IIIIHHBBHBx")
 STATUS_AXIS: Final = struct.Struct("<ihhH")
 STATUS_END: Final = struct.Struct("<H4hHHH")
 FAULT: Final = struct.Struct("<HBBII6i")
 NAK: Final = struct.Struct("<IBBH")
+CLOCK_REQ: Final = struct.Struct("<Q")
+CLOCK: Final = struct.Struct("<QQI")
+RATE: Final = struct.Struct("<HH")
+OD_READ: Final = struct.Struct("<BHB")
+OD_WRITE: Final = struct.Struct("<BHBH")
+OD_ACK: Final = struct.Struct("<BHBIH")
 KEEPALIVE: Final = struct.Struct("<II")
 EXECUTED: Final = struct.Struct("<IB3x")
 EXECUTED_TICK: Final = struct.Struct("<6i6i6hH")
@@ -61,7 +67,10 @@ FAULTS: Final = {
     7: ("torque", "a motor needs too much torque"),
     8: ("pressure", "a pressure is beyond what the bridge was told"),
     9: ("emergency-stop", "the emergency stop is pressed"),
+    10: ("setpoint-late", "the bridge itself was late with a setpoint"),
 }
+OF_THE_MACHINE: Final = (6, 7, 9)
+"""faults that an operator must look at before FAULT_RESET"""
 NAKS: Final = {
     1: "crc",
     2: "gap",
@@ -80,9 +89,13 @@ class Status:
     """What a bridge says every 20 ms."""
 
     tick: int
+    """next one to be played"""
     expected: int
     """next tick it would accept"""
-    stop_tick: int | None
+    stop_output: int | None
+    """number of the first output of the stop"""
+    output: int
+    """number of the next output"""
     buffered: int
     capacity: int
     state: State
@@ -93,11 +106,11 @@ class Status:
 
 def status(payload: bytes) -> Status:
     """STATUS; raises struct.error for another length."""
-    tick, expected, stop, buffered, capacity, state, _, _, revision = STATUS.unpack_from(payload)
+    tick, expected, stop, output, buffered, capacity, state, _, _, revision = STATUS.unpack_from(payload)
     axes = [STATUS_AXIS.unpack_from(payload, STATUS.size + k * STATUS_AXIS.size)[0] for k in range(6)]
     end = STATUS_END.unpack_from(payload, STATUS.size + 6 * STATUS_AXIS.size)
-    stop_tick = None if stop == NO_TICK else stop
-    return Status(tick, expected, stop_tick, buffered, capacity, State(state), tuple(axes), end[5], revision)
+    ticks = (tick, expected, None if stop == NO_TICK else stop, output)
+    return Status(*ticks, buffered, capacity, State(state), tuple(axes), end[5], revision)
 
 
 def ramp_ticks(profile: Profile) -> int:

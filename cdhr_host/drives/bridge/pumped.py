@@ -9,8 +9,9 @@ import threading
 import time
 from typing import Final
 
-from cdhr_host.drives.bridge.host import TURN, BridgeLink
+from cdhr_host.drives.bridge.host import BridgeLink
 from cdhr_host.drives.bridge.line import SerialLine
+from cdhr_host.drives.bridge.talker import TURN
 from cdhr_host.drives.clock import MonotonicClock
 from cdhr_host.drives.link import LinkState
 from cdhr_host.drives.timing import CycleTiming

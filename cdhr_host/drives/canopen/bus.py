@@ -2,6 +2,7 @@
 
 import logging
 import queue
+import struct
 from collections import Counter
 from collections.abc import Callable
 from functools import cache
@@ -26,6 +27,10 @@ TWIN: Final = 0.005
 NODES: Final = (1, 2, 3, 4, 5, 6, 7)
 COUPLER: Final = 7
 HOST: Final = 127
+SIGNED: Final = (2, 3, 4)
+"""data types INTEGER8, 16 and 32, CiA 301"""
+SCAN: Final = 0.3
+"""s nodes may take to answer a scan"""
 
 
 class Abort(Exception):  # noqa: N818 - an answer of a node
@@ -53,6 +58,20 @@ def object_name(node: int, index: int, sub: int) -> str:
 def node_name(node: int) -> str:
     """In the words of an operator."""
     return f"drive {node}" if node in NODES[:6] else "the coupler" if node == COUPLER else f"node {node}"
+
+
+def number_of(raw: bytes, node: int, index: int, sub: int) -> int:
+    """The bytes of an object as the number they are by the dictionary."""
+    variable = dictionary(node).get_variable(index, sub)
+    signed = variable is not None and variable.data_type in SIGNED
+    return int.from_bytes(raw, "little", signed=signed)
+
+
+def object_bytes(node: int, index: int, sub: int, value: int, size: int | None = None) -> bytes:
+    """A number as the bytes of an object; its size is the dictionary's unless given."""
+    variable = dictionary(node).get_variable(index, sub)
+    length = size or (len(variable) // 8 if variable is not None else 4)
+    return (value & (1 << 8 * length) - 1).to_bytes(length, "little")
 
 
 class _Answers(queue.Queue[bytes]):
@@ -124,10 +143,7 @@ class Bus:
 
     def read(self, node: int, index: int, sub: int = 0) -> int:
         """A number; raises Abort, DriveError when the node is silent."""
-        raw = self.upload(node, index, sub)
-        variable = dictionary(node).get_variable(index, sub)
-        signed = variable is not None and variable.data_type in (2, 3, 4)
-        return int.from_bytes(raw, "little", signed=signed)
+        return number_of(self.upload(node, index, sub), node, index, sub)
 
     def upload(self, node: int, index: int, sub: int = 0) -> bytes:
         """The bytes of an object; raises Abort, DriveError."""
@@ -135,10 +151,32 @@ class Bus:
 
     def write(self, node: int, index: int, sub: int, value: int, size: int | None = None) -> None:
         """Write a number; its size is the dictionary's unless given; raises Abort, DriveError."""
-        variable = dictionary(node).get_variable(index, sub)
-        length = size or (len(variable) // 8 if variable is not None else 4)
-        data = (value & (1 << 8 * length) - 1).to_bytes(length, "little")
+        data = object_bytes(node, index, sub, value, size)
         self._transfer(node, index, sub, lambda client: client.download(index, sub, data))
+
+    def nodes(self) -> list[int]:
+        """Ids 1-127 that answer."""
+        found: set[int] = set()
+
+        def answered(frame: Frame) -> bool:
+            if 0x580 < frame[0] < 0x600:
+                found.add(frame[0] - 0x580)
+            return False
+
+        self.on_frame = answered
+        request = struct.pack("<BHB4x", 0x40, 0x1000, 0)
+        for first in range(1, 128, 16):
+            self.port.send([(0x600 + node, request) for node in range(first, min(first + 16, 128))])
+            self.until(lambda: False, SCAN / 8)
+        self.on_frame = lambda _frame: False
+        return sorted(found)
+
+    def forget_fault(self) -> None:
+        """Nothing: every drive keeps its own fault."""
+
+    def close(self) -> None:
+        """Give the bus back."""
+        self.port.close()
 
     def another_answer(self, node: int) -> bool:
         """Whether more than one node answered the request just made."""

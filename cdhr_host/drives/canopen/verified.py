@@ -1,6 +1,6 @@
 """Objects written and read back; a refusal names the object."""
 
-from typing import Final
+from typing import Final, Protocol
 
 from cdhr_host.drives.canopen.bus import Abort, Bus, node_name, object_name
 from cdhr_host.errors import DriveError, Problem
@@ -8,6 +8,14 @@ from cdhr_host.errors import DriveError, Problem
 NO_OBJECT: Final = 0x06020000
 NO_SUB_INDEX: Final = 0x06090011
 ABSENT: Final = (NO_OBJECT, NO_SUB_INDEX)
+
+
+class ObjectReader(Protocol):
+    """Who can read an object: the bus itself, or a bridge."""
+
+    def read(self, node: int, index: int, sub: int = 0) -> int:
+        """A number; raises Abort."""
+        ...
 
 
 def refused(node: int, index: int, sub: int, what: str, hint: str | None = None) -> DriveError:
@@ -42,7 +50,7 @@ def verified(
         raise refused(node, index, sub, f"reads back {found}, written was {value}")
 
 
-def read(bus: Bus, node: int, index: int, sub: int = 0) -> int:
+def read(bus: ObjectReader, node: int, index: int, sub: int = 0) -> int:
     """Read; raises DriveError where the node refuses."""
     try:
         return bus.read(node, index, sub)

@@ -7,19 +7,22 @@ from collections.abc import Callable
 from enum import IntEnum
 from typing import Final
 
-import numpy as np
-
-from cdhr_host.drives.sim.framing import cobs, plain
-from cdhr_host.drives.sim.store import CAPACITY, Code, Limits, Nak, Refused, Store, Violated
-from cdhr_host.plant import Disturbance, Machine, undisturbed
+from cdhr_host.drives.sim.motors import Motors
+from cdhr_host.drives.sim.objects import Objects
+from cdhr_host.drives.sim.store import CAPACITY, Code, Limits, Nak, Refused, Store, Tick, Violated
+from cdhr_host.drives.sim.wire import HELLO, Wire
+from cdhr_host.plant import Disturbance, undisturbed
 from cdhr_host.profile.schema import Profile
-from cdhr_host.units import KPA
-from cdhr_host.values import Array, Setpoints
 
 STATUS_EVERY: Final = 0.02
 FAULT_EVERY: Final = 0.1
 RESEND: Final = 0.1
-"""s after which executed ticks that the host did not take are sent again"""
+"""s after which outputs that the host did not take are sent again"""
+PER_FRAME: Final = 6
+NEAR: Final = 600
+"""position units between ARM's start and where the sliders stand"""
+LONGEST_RAMP: Final = 2000
+NO_TICK: Final = 0xFFFFFFFF
 
 
 class State(IntEnum):
@@ -29,101 +32,107 @@ class State(IntEnum):
     IDLE = 1
     PRIMING = 2
     RUN = 3
+    HOLDING = 4
+    HELD = 5
     STOPPING = 6
     FAULT = 7
 
 
-TAKING: Final = (State.PRIMING, State.RUN)
+PLAYING: Final = (State.RUN, State.HOLDING)
+TAKING: Final = (State.PRIMING, State.RUN, State.HOLDING, State.HELD)
+STANDING: Final = (State.BOOT, State.IDLE, State.FAULT)
 
 
 class Bridge:
-    """Bytes in, bytes out, ticks in between. ``received`` has each executed setpoint once."""
+    """Bytes in, bytes out, outputs in between.
 
-    def __init__(self, profile: Profile, now: float, disturbance: Disturbance = undisturbed) -> None:
+    ``received`` has each output once: six position units and the pressure. An output more
+    than a period and ``grace`` s late is a fault, not played in a burst.
+    """
+
+    def __init__(
+        self, profile: Profile, now: float, disturbance: Disturbance = undisturbed, *, grace: float = 0.0
+    ) -> None:
         self.profile = profile
         self.state = State.BOOT
         self.code = Code.NONE
-        self.received: list[tuple[int, ...]] = []
+        self.received: list[Tick] = []
         self.estop = False
-        self._now = now
-        self._unit = profile.canopen.position_unit
-        self._machine = Machine(profile, disturbance)
-        self._plant = self._machine.standing(np.zeros(6))
-        self._position: tuple[int, ...] = (0,) * 6
-        self._torque: tuple[int, ...] = (0,) * 6
-        self._pressure = 0
-        self._text = bytearray()
-        self._out = bytearray()
-        self._session = self._seq = self._ack = 0
-        self.dropped = self.gaps = self.late = 0
-        self._heard = self._status_at = self._fault_at = self._sent_at = now
-        self._told = True
+        self.gaps = self.late = 0
+        self.air = 0
+        self.wire = Wire()
+        self._grace = grace
+        self._period = profile.drives.period
+        self._now = self._booted = now
+        self._motors = Motors(profile, disturbance)
+        self._objects = Objects(profile)
+        self._axis = 255
+        self._heard = self._status_at = self._fault_at = self._sent_at = self._executed_at = now
         self._config: bytes | None = None
         self._reset((0,) * 6)
+
+    @property
+    def dropped(self) -> int:
+        """Frames that were none, or not of this session."""
+        return self.wire.dropped
 
     def exchange(self, now: float, data: bytes) -> bytes:
         """Bytes from the host -> bytes to it, by the time ``now``."""
         self._now = now
-        for byte in data:
-            if byte:
-                self._text.append(byte)
-            else:
-                text, self._text = bytes(self._text), bytearray()
-                self._frame(text)
+        for kind, session, payload in self.wire.frames(data):
+            self._heard = now
+            self._obey(kind, session, payload)
         self._run(now)
         self._speak(now)
-        out, self._out = bytes(self._out), bytearray()
-        return out
+        return self.wire.taken()
 
     def report(self) -> dict[str, object]:
         """What was received, in numbers."""
         return {
             "cycles": len(self.received),
             "received": len(self.received),
-            "lost_ticks": self.gaps,
+            "lost_ticks": self.gaps + self.late,
             "dropped_frames": self.dropped,
-            "at_rest": self.state not in (State.RUN, State.STOPPING),
-            "pressure_raw": self._air if self.state in (State.RUN, State.STOPPING) else 0,
+            "at_rest": self.state not in (*PLAYING, State.STOPPING),
+            "pressure_raw": self.air,
             "states": [self.state.name.lower()],
         }
 
-    def record(self) -> list[tuple[int, ...]]:
-        """Six position units and the pressure, in tenths of a kPa, of each executed tick."""
+    def record(self) -> list[Tick]:
+        """Six position units and the pressure, in tenths of a kPa, of each output."""
         return self.received
 
-    def _reset(self, start: tuple[int, ...]) -> None:
+    def _reset(self, start: Tick) -> None:
         """Nothing buffered, standing at ``start``."""
         self.store = Store(start)
-        self._executed: deque[tuple[int, ...]] = deque()
-        self._first_kept = self._next_sent = 0
+        self._executed: deque[Tick] = deque()
+        self._output = self._first_kept = self._next_sent = 0
+        self._stop_output = NO_TICK
         self._due: float | None = None
-        self._air = 0
+        self.air = 0
 
-    def _frame(self, text: bytes) -> None:
-        body = plain(text)
-        if body is None or len(body) < 12 or zlib.crc32(body[:-4]) != int.from_bytes(body[-4:], "little"):
-            self.dropped += bool(text)
-            return
-        version, kind, seq, _, session = struct.unpack_from("<BBHHH", body)
-        if version != 1 or (kind != 1 and session != self._session):
-            self.dropped += 1
-            return
-        self._heard, self._ack = self._now, seq
-        payload = body[8:-4]
-        handler: Callable[[], None] | None = {
-            0x01: lambda: self._hello(session),
-            0x02: lambda: self._configure(payload),
-            0x10: lambda: self._arm(payload),
-            0x11: lambda: self._take(payload),
+    def _obey(self, kind: int, session: int, payload: bytes) -> None:
+        handler: Callable[[bytes], None] | None = {
+            0x02: self._configure,
+            0x03: self._clock,
+            0x10: self._arm,
+            0x11: self._take,
             0x12: self._stop_now,
             0x13: self._disarm,
-            0x15: lambda: self._keepalive(payload),
-            0x17: lambda: self._revise(payload),
+            0x14: self._fault_reset,
+            0x15: self._keepalive,
+            0x16: self._change_rate,
+            0x17: self._revise,
+            0x20: self._read_object,
+            0x21: self._write_object,
         }.get(kind)
         try:
-            if handler is None:
+            if kind == HELLO:
+                self._hello(session)
+            elif handler is None:
                 raise Refused(Nak.STATE)
-            handler()
+            else:
+                handler(payload)
         except Refused as refused:
             self.gaps += refused.reason is Nak.GAP
             self._nak(refused)
@@ -131,38 +140,47 @@ class Bridge:
             self._trip(found.code, found.axis)
 
     def _hello(self, session: int) -> None:
-        if self.state in (State.RUN, State.STOPPING):
+        if self.state in (*PLAYING, State.HELD, State.STOPPING):
             raise Refused(Nak.STATE)
-        self._session, self.code, self._told = session, Code.NONE, True
-        self.state = State.IDLE
-        self._reset(self._position)
-        self._say(
-            0x81,
-            struct.pack(
-                "<BBBBIIII8sHHIII", 1, 1, 2, 6, 1217, 1, 1, 1, bytes(8), CAPACITY, 524, 1000, 20000, 0
-            ),
-        )
+        self.wire.session = session
+        self.state = State.FAULT if self.code else State.IDLE
+        self._reset(self._motors.position)
+        identity = (1, 1, 2, 6, 1217, 1, 1, 1, bytes(8), CAPACITY, 524, 1000, 20000, 0)
+        self.wire.say(0x81, struct.pack("<BBBBIIII8sHHIII", *identity))
 
     def _configure(self, payload: bytes) -> None:
         self._config = payload
         self._limits = Limits(payload)
-        self._say(0x82, struct.pack("<I", zlib.crc32(payload)))
+        self.wire.say(0x82, struct.pack("<I", zlib.crc32(payload)))
+
+    def _clock(self, payload: bytes) -> None:
+        (asked,) = struct.unpack("<Q", payload)
+        microseconds = round((self._now - self._booted) * 1e6)
+        self.wire.say(0x83, struct.pack("<QQI", asked, microseconds, self.store.tick))
 
     def _arm(self, payload: bytes) -> None:
         crc, *start = struct.unpack("<I6i", payload)
-        near = all(abs(a - b) <= 600 for a, b in zip(start, self._position, strict=True))
+        near = all(abs(a - b) <= NEAR for a, b in zip(start, self._motors.position, strict=True))
         armable = self.state in (State.IDLE, State.PRIMING) and not self.estop
         if self._config is None or crc != zlib.crc32(self._config) or not near or not armable:
             raise Refused(Nak.STATE)
         if self.state is State.IDLE:
             self._reset(tuple(start))
-            told = np.array(start) * self._unit
-            self._plant = self._machine.standing(self._plant.slider, setpoint=told)
+            self._motors.stand(tuple(start))
         self.state = State.PRIMING
 
-    def _disarm(self) -> None:
-        if self.state is not State.FAULT:
+    def _disarm(self, _payload: bytes) -> None:
+        if self.state is State.PRIMING or (self.state is State.RUN and not self.store.ticks):
             self.state = State.IDLE
+        elif self.state not in STANDING:
+            raise Refused(Nak.STATE)
+
+    def _fault_reset(self, _payload: bytes) -> None:
+        """An operator's wish; nothing is armed by it."""
+        if self.state is not State.FAULT or self.estop:
+            raise Refused(Nak.STATE)
+        self.code, self.state = Code.NONE, State.IDLE
+        self._reset(self._motors.position)
 
     def _keepalive(self, payload: bytes) -> None:
         _, wanted = struct.unpack("<II", payload)
@@ -178,7 +196,7 @@ class Bridge:
         fresh = self.store.expected is None
         self.store.take(payload, self._limits)
         if fresh:
-            self._first_kept = self._next_sent = self.store.tick
+            self._output = self._first_kept = self._next_sent = self.store.tick
         self._go_when_primed()
 
     def _revise(self, payload: bytes) -> None:
@@ -189,88 +207,112 @@ class Bridge:
             self._status_at = -STATUS_EVERY
             self._go_when_primed()
 
-    def _go_when_primed(self) -> None:
-        if self.store.rests or len(self.store.ticks) >= self._limits.low + self._limits.ramp:
-            self._go()
+    def _change_rate(self, payload: bytes) -> None:
+        """RATE: another playback rate, or none at all."""
+        permille, ramp = struct.unpack("<HH", payload)
+        if permille > 1000 or not 1 <= ramp <= LONGEST_RAMP:
+            raise Refused(Nak.RANGE)
+        if self.state not in (*PLAYING, State.HELD) or (self.state is State.HELD and not self._primed):
+            raise Refused(Nak.STATE)
+        self.store.pace.change(permille, ramp, self.store.fraction)
+        self.state = State.RUN if permille else State.HOLDING
+        self._start()
 
-    def _go(self) -> None:
-        if self.state is State.PRIMING or self._due is None:
+    def _read_object(self, payload: bytes) -> None:
+        self.wire.say(0xA0, self._objects.read(payload, self._motors.position))
+
+    def _write_object(self, payload: bytes) -> None:
+        self.wire.say(0xA1, self._objects.write(payload, standing=self.state in STANDING))
+
+    @property
+    def _primed(self) -> bool:
+        return self.store.rests or len(self.store.ticks) >= self._limits.low + self._limits.ramp
+
+    def _go_when_primed(self) -> None:
+        if self._primed and self.state in (State.PRIMING, State.RUN):
             self.state = State.RUN
-            self._due = self._now + self.profile.drives.period
+            self._start()
+
+    def _start(self) -> None:
+        if self._due is None:
+            self._due = self._now + self._period
 
     def _run(self, now: float) -> None:
-        """Execute the ticks that are due; watch the link."""
-        if self.state in (State.PRIMING, State.RUN) and now - self._heard > self._limits.watchdog:
-            self._trip(Code.LINK_LOST, 255)
-        if self.estop and self.state in (State.PRIMING, State.RUN):
-            self._trip(Code.EMERGENCY_STOP, 255)
+        """The outputs that are due; watch the link and the air."""
+        if self.state in TAKING and now - self._heard > self._limits.watchdog:
+            self._trip(Code.LINK_LOST)
+        if self.estop and self.state in TAKING:
+            self._trip(Code.EMERGENCY_STOP)
+        if self._due is not None and now - self._due > self._period + self._grace:
+            self.late += 1
+            self._due = now
+            self._trip(Code.LATE)
         while self._due is not None and self._due <= now + 1e-9:
-            self._due += self.profile.drives.period
+            self._executed_at = self._due
+            self._due += self._period
             self._step()
+        if self.air and now - self._executed_at > self._limits.hold + 1e-9:
+            self.air = 0
 
     def _step(self) -> None:
+        """One output, or the end of them."""
         if self.state is State.STOPPING:
             if self.store.stop:
                 self._execute(self.store.stop.popleft())
             else:
-                self._due, self.state = None, State.FAULT if self.code else State.IDLE
+                self._rest(State.FAULT if self.code else State.IDLE)
                 self.store.ticks.clear()
-            return
-        if not self.store.ticks:
-            self._due = None
-            return
-        if not self.store.rests and len(self.store.ticks) <= self._limits.low:
-            self._trip(Code.UNDERRUN, 255)
+        elif self.state is State.HOLDING and not self.store.pace.rate and self.store.pace.steady:
+            self._rest(State.HELD)
+        elif not self.store.ticks:
+            self._rest(State.HELD if self.state is State.HOLDING else State.RUN)
+        elif not self.store.rests and len(self.store.ticks) <= self._least:
+            self._trip(Code.UNDERRUN)
             self._step()
-            return
-        self._execute(self.store.ticks.popleft())
+        else:
+            self._execute(self.store.play())
 
-    def _execute(self, tick: tuple[int, ...]) -> None:
-        self._air = tick[12]
-        slider = np.array([tick[:6]]) * self._unit
-        torque = np.array([tick[6:12]]) * 1e-3 * self.profile.canopen.rated_torque
-        turned = 2.0 * np.pi * self.profile.drives.screw_efficiency / self.profile.sliders.screw_lead
-        self._plant, feedback = self._machine.step(self._plant, self._row(slider, torque * turned))
-        self._position = tuple(int(v) for v in np.rint(feedback.slider[0] / self._unit))
-        self._torque = tuple(
-            int(v) for v in np.rint(feedback.torque[0] / self.profile.canopen.rated_torque * 1e3)
+    @property
+    def _least(self) -> int:
+        """Ticks that must be left; a hold under way needs no more than it plays."""
+        return self._limits.low if self.state is State.RUN else 2
+
+    def _rest(self, state: State) -> None:
+        self._due, self.state = None, state
+        if state is not State.RUN:
+            self.air = 0
+
+    def _execute(self, tick: Tick) -> None:
+        self.air = tick[12]
+        beyond = self._motors.execute(tick)
+        self._executed.append(
+            (*tick[:6], *self._motors.position, *self._motors.torque, self._motors.pressure)
         )
-        self._pressure = round(feedback.pressure[0] / (0.1 * KPA))
-        self._executed.append((*tick[:6], *self._position, *self._torque, self._pressure))
         self.received.append((*tick[:6], tick[12]))
-        self.store.tick += 1
-        away = [abs(a - b) for a, b in zip(self._position, tick[:6], strict=True)]
-        if max(away) * self._unit > self.profile.drives.following_error_max and not self.code:
-            self._trip(Code.FOLLOWING, away.index(max(away)))
+        self._output += 1
+        if beyond is not None:
+            self._trip(Code.FOLLOWING, beyond)
 
-    def _row(self, slider: Array, tension: Array) -> Setpoints:
-        zero = np.zeros((1, 3))
-        tick = np.array([self.store.tick])
-        pressure = np.array([self._air * 0.1 * KPA])
-        return Setpoints(
-            tick, tick * 1.0, tick * 0, zero, zero.copy(), slider, tension, np.zeros(1), pressure
-        )
-
-    def _stop_now(self) -> None:
-        if self.state is State.PRIMING or (self.state is State.RUN and not self.store.ticks):
-            self.state = State.IDLE
+    def _stop_now(self, _payload: bytes) -> None:
+        if self.state in (State.PRIMING, State.HELD) or (self.state is State.RUN and not self.store.ticks):
+            self._rest(State.IDLE)
             self.store.ticks.clear()
-        elif self.state is State.RUN:
+        elif self.state in PLAYING:
             self._begin_stop()
 
     def _begin_stop(self) -> None:
-        self.state = State.STOPPING
+        self.state, self._stop_output = State.STOPPING, self._output
         self.store.begin_stop(self._limits.ramp)
 
-    def _trip(self, code: Code, axis: int) -> None:
+    def _trip(self, code: Code, axis: int = 255) -> None:
         if self.code:
             return
-        self.code, self._axis, self._told = code, axis, False
+        self.code, self._axis = code, axis
         self._fault_at = self._now - FAULT_EVERY
-        if self.state is State.RUN and self.store.ticks:
+        if self.state in PLAYING and self.store.ticks:
             self._begin_stop()
         elif self.state is not State.STOPPING:
-            self.state, self._due = State.FAULT, None
+            self._rest(State.FAULT)
 
     def _speak(self, now: float) -> None:
         """EXECUTED, STATUS, FAULT as they are due."""
@@ -281,47 +323,33 @@ class Bridge:
         self._say_executed()
         if now - self._status_at >= STATUS_EVERY:
             self._status_at = now
-            self._say(0x91, self._status())
+            self.wire.say(0x91, self._status())
         if self.code and now - self._fault_at >= FAULT_EVERY:
             self._fault_at = now
-            self._say(
-                0x92, struct.pack("<HBBII6i", self.code, self._axis, 1, self.store.tick, 0, *self._position)
-            )
+            where = (self.store.tick, 0, *self._motors.position)
+            self.wire.say(0x92, struct.pack("<HBBII6i", self.code, self._axis, 1, *where))
 
     def _say_executed(self) -> None:
         while (skip := self._next_sent - self._first_kept) < len(self._executed):
-            batch = [self._executed[k] for k in range(skip, min(skip + 6, len(self._executed)))]
+            batch = [self._executed[k] for k in range(skip, min(skip + PER_FRAME, len(self._executed)))]
             body = b"".join(struct.pack("<6i6i6hH", *row) for row in batch)
-            self._say(0x93, struct.pack("<IB3x", self._next_sent, len(batch)) + body)
+            self.wire.say(0x93, struct.pack("<IB3x", self._next_sent, len(batch)) + body)
             self._next_sent += len(batch)
 
     def _status(self) -> bytes:
-        none = 0xFFFFFFFF
-        head = struct.pack(
-            "<IIIHHBBHBx",
-            self.store.tick,
-            self.store.tick if self.store.expected is None else self.store.expected,
-            none if self.store.stop_tick is None else self.store.stop_tick,
-            len(self.store.ticks),
-            CAPACITY,
-            self.state,
-            int(not self.estop),
-            1000,
-            self.store.revision,
-        )
+        store = self.store
+        expected = store.tick if store.expected is None else store.expected
+        ticks = (store.tick, expected, self._stop_output, self._output, len(store.ticks), CAPACITY)
+        rate = store.pace.rate * 1000 >> 16
+        head = struct.pack("<IIIIHHBBHBx", *ticks, self.state, int(not self.estop), rate, store.revision)
         axes = b"".join(
             struct.pack("<ihhH", at, 0, torque, 0x1237)
-            for at, torque in zip(self._position, self._torque, strict=True)
+            for at, torque in zip(self._motors.position, self._motors.torque, strict=True)
         )
-        counters = (self.dropped & 0xFFFF, self.gaps & 0xFFFF)
-        return head + axes + struct.pack("<H4hHHH", self._pressure, 0, 0, 0, 0, *counters, self.late)
+        counters = (self.dropped & 0xFFFF, self.gaps & 0xFFFF, self.late & 0xFFFF)
+        return head + axes + struct.pack("<H4hHHH", self._motors.pressure, 0, 0, 0, 0, *counters)
 
     def _nak(self, refused: Refused) -> None:
         expected = self.store.tick if self.store.expected is None else self.store.expected
         number = self.store.revision if refused.revision is None else refused.revision
-        self._say(0x94, struct.pack("<IBBH", expected, refused.reason, number, self.store.credit))
-
-    def _say(self, kind: int, payload: bytes) -> None:
-        self._seq = self._seq + 1 & 0xFFFF
-        body = struct.pack("<BBHHH", 1, kind, self._seq, self._ack, self._session) + payload
-        self._out += cobs(body + struct.pack("<I", zlib.crc32(body))) + b"\0"
+        self.wire.say(0x94, struct.pack("<IBBH", expected, refused.reason, number, self.store.credit))

@@ -8,6 +8,7 @@ import numpy as np
 
 from cdhr_host.drives.sim.coupler import RAW, Coupler
 from cdhr_host.drives.sim.drive import Drive, State
+from cdhr_host.drives.sim.identity import identify
 from cdhr_host.drives.sim.node import Frame, Nmt, Node
 from cdhr_host.plant import Disturbance, Machine, undisturbed
 from cdhr_host.profile.schema import Profile
@@ -54,7 +55,8 @@ class Station:
         self._ticks = 0
         self.disturb(disturbance)
         self.state = self._plant.standing(np.zeros(6))
-        self._identify()
+        for node in self.nodes:
+            identify(node.dictionary, node.id, profile)
 
     @property
     def nodes(self) -> list[Node]:
@@ -114,19 +116,6 @@ class Station:
         for node in self.nodes:
             node.outbox.clear()
         return list(chain.from_iterable(map(self.outbound, sent)))
-
-    def _identify(self) -> None:
-        settings = self.profile.canopen
-        serials = settings.drive_serials or [0] * 6
-        for drive, serial in zip(self.drives, serials, strict=True):
-            identity = (settings.drive_vendor, settings.drive_product, 0x10000, serial)
-            for sub, value in enumerate(identity, start=1):
-                drive.dictionary.fixed((0x1018, sub), value)
-            turn = round(self.profile.sliders.screw_lead / self._unit)
-            drive.dictionary.fixed((0x6092, 1), turn)
-            drive.dictionary.fixed((0x6076, 0), round(self._rated * 1e3))
-        self.coupler.dictionary.fixed((0x1018, 1), settings.io_vendor)
-        self.coupler.dictionary.fixed((0x1018, 2), settings.io_product)
 
     def _sync(self, now: float, data: bytes) -> None:
         fresh = any(drive.rpdos[0].latched is not None for drive in self.drives)

@@ -5,12 +5,13 @@ from collections import deque
 from enum import IntEnum
 from typing import Final
 
+from cdhr_host.drives.sim.pace import ONE, Pace, eased
+
 Tick = tuple[int, ...]
 """six positions, six torques, pressure, outputs"""
 
 CAPACITY: Final = 1024
 BATCH: Final = 8
-ONE: Final = 65536
 
 
 class Code(IntEnum):
@@ -25,6 +26,7 @@ class Code(IntEnum):
     FOLLOWING = 6
     PRESSURE = 8
     EMERGENCY_STOP = 9
+    LATE = 10
 
 
 class Nak(IntEnum):
@@ -32,6 +34,7 @@ class Nak(IntEnum):
 
     GAP = 2
     ORDER = 3
+    RANGE = 4
     OVERFLOW = 5
     STATE = 7
     LATE = 8
@@ -86,7 +89,8 @@ class Store:
         self.rests = True
         self.revision = 0
         self.stop: deque[Tick] = deque()
-        self.stop_tick: int | None = None
+        self.pace = Pace()
+        self.fraction = 0
         self._last: tuple[Tick, Tick] = (start, start)
         self._gathering = 0
         self._from = 0
@@ -134,20 +138,33 @@ class Store:
             self._change_over(rests=bool(flags & 1))
         return bool(flags & 2)
 
+    def play(self) -> Tick:
+        """The next output; without air while playback is asked to stand."""
+        here = self._between(self.fraction)
+        air = here[12:] if self.pace.target else (0, 0)
+        self.fraction += self.pace.step()
+        while self.fraction >= ONE and self.ticks:
+            self.ticks.popleft()
+            self.tick += 1
+            self.fraction -= ONE
+        if not self.ticks:
+            self.fraction = 0
+        return (*here[:12], *air)
+
     def begin_stop(self, ramp: int) -> None:
-        """Time-scaled: rate 1 - 3 z² + 2 z³ over ``ramp`` ticks along what is stored, section 7."""
-        self.stop_tick = self.tick
-        stored, time = list(self.ticks), 0
+        """From the rate of now to rest over ``ramp`` outputs along what is stored, without air, section 7."""
+        time = self.fraction
         for step in range(ramp + 1):
             if step:
-                z = step * ONE // ramp
-                squared = z * z >> 16
-                time += ONE - 3 * squared + 2 * (squared * z >> 16)
-            time = min(time, (len(stored) - 1) * ONE)
-            first, share = time >> 16, time & (ONE - 1)
-            a, b = stored[first], stored[min(first + 1, len(stored) - 1)]
-            at = [a[k] + ((b[k] - a[k]) * share >> 16) for k in range(6)]
-            self.stop.append((*at, *a[6:12], 0, 0))
+                time += self.pace.rate * (ONE - eased(step, ramp)) >> 16
+            time = min(time, (len(self.ticks) - 1) * ONE)
+            self.stop.append((*self._between(time)[:12], 0, 0))
+
+    def _between(self, time: int) -> Tick:
+        """The stored setpoint at a playback time from the first stored tick on."""
+        first, share = time >> 16, time & (ONE - 1)
+        a, b = self.ticks[first], self.ticks[min(first + 1, len(self.ticks) - 1)]
+        return (*(a[k] + ((b[k] - a[k]) * share >> 16) for k in range(6)), *a[6:])
 
     def _begin(self, start: int, number: int) -> None:
         """Two stored ticks before it must be there, so that its first steps can be checked."""
@@ -160,7 +177,7 @@ class Store:
     def _change_over(self, *, rests: bool) -> None:
         number, self._gathering = self._gathering, 0
         kept = self._from - self.tick
-        if kept < 0:
+        if kept < 1:
             raise Refused(Nak.LATE, number)
         self.ticks = deque([*list(self.ticks)[:kept], *self._gathered])
         self.expected = self._from + len(self._gathered)

@@ -1,22 +1,17 @@
 """Looking at drives one by one, without a cycle: what an electrician needs."""
 
-import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from cdhr_host.drives.address import port_of
-from cdhr_host.drives.canopen.bus import COUPLER, NODES, Abort, Bus, node_name, object_name
+from cdhr_host.drives.access import ObjectAccess
+from cdhr_host.drives.canopen.bus import COUPLER, NODES, Abort, node_name, object_name
 from cdhr_host.drives.canopen.cia402 import DISABLE_VOLTAGE, FAULT_RESET, State, decoded
 from cdhr_host.drives.canopen.emergencies import meaning
 from cdhr_host.drives.canopen.verified import read, refused
-from cdhr_host.drives.clock import Clock
 from cdhr_host.drives.faults import fault
-from cdhr_host.drives.slcan import Frame
 from cdhr_host.profile.schema import CanOpen
 
-SCAN: Final = 0.3
-"""s nodes may take to answer a scan"""
 RESET: Final = 1.0
 """s a drive may take to leave its fault"""
 
@@ -50,30 +45,12 @@ class AxisStatus:
     mode: int
 
 
-def connect(url: str, clock: Clock) -> Bus:
-    """The bus of a URL; close it by ``bus.port.close()``."""
-    return Bus(port_of(url), clock)
+def scan(bus: ObjectAccess) -> list[Node]:
+    """All nodes that answer."""
+    return [_node(bus, node) for node in bus.nodes()]
 
 
-def scan(bus: Bus) -> list[Node]:
-    """All nodes that answer, ids 1-127."""
-    found: set[int] = set()
-
-    def answered(frame: Frame) -> bool:
-        if 0x580 < frame[0] < 0x600:
-            found.add(frame[0] - 0x580)
-        return False
-
-    bus.on_frame = answered
-    request = struct.pack("<BHB4x", 0x40, 0x1000, 0)
-    for first in range(1, 128, 16):
-        bus.port.send([(0x600 + node, request) for node in range(first, min(first + 16, 128))])
-        bus.until(lambda: False, SCAN / 8)
-    bus.on_frame = lambda _frame: False
-    return [_node(bus, node) for node in sorted(found)]
-
-
-def status(bus: Bus, settings: CanOpen) -> Iterator[AxisStatus]:
+def status(bus: ObjectAccess, settings: CanOpen) -> Iterator[AxisStatus]:
     """Each of the six drives."""
     for node in NODES[:6]:
         error = read(bus, node, 0x603F)
@@ -86,7 +63,7 @@ def status(bus: Bus, settings: CanOpen) -> Iterator[AxisStatus]:
         )
 
 
-def read_object(bus: Bus, node: int, index: int, sub: int) -> str:
+def read_object(bus: ObjectAccess, node: int, index: int, sub: int) -> str:
     """``0x6065:00 Following error window = 10000 (0x2710)``; raises DriveError."""
     try:
         raw = bus.upload(node, index, sub)
@@ -99,7 +76,7 @@ def read_object(bus: Bus, node: int, index: int, sub: int) -> str:
     return f"{name} = {value} (0x{value & 0xFFFFFFFF:X})"
 
 
-def write_object(bus: Bus, node: int, index: int, sub: int, value: int) -> str:
+def write_object(bus: ObjectAccess, node: int, index: int, sub: int, value: int) -> str:
     """Write, then what is read back; raises DriveError."""
     try:
         bus.write(node, index, sub, value)
@@ -108,7 +85,7 @@ def write_object(bus: Bus, node: int, index: int, sub: int, value: int) -> str:
     return read_object(bus, node, index, sub)
 
 
-def reset(bus: Bus, node: int) -> State:
+def reset(bus: ObjectAccess, node: int) -> State:
     """Out of fault by a rising edge of bit 7, never further than switch-on disabled."""
     if node == COUPLER or node not in NODES:
         raise fault("node", f"{node_name(node)} is no drive")
@@ -118,9 +95,10 @@ def reset(bus: Bus, node: int) -> State:
     if not left:
         error = meaning(read(bus, node, 0x603F))
         raise fault("drive-fault", f"{node_name(node)} stays in fault: {error}")
+    bus.forget_fault()
     return decoded(read(bus, node, 0x6041))
 
 
-def _node(bus: Bus, node: int) -> Node:
+def _node(bus: ObjectAccess, node: int) -> Node:
     identity = [read(bus, node, 0x1018, sub) for sub in (1, 2, 4)]
     return Node(node, read(bus, node, 0x1000), *identity)
