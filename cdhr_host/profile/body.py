@@ -105,7 +105,7 @@ class Spring(Section):
         Field(
             description="where the upper platform stands: constant offset, constant force, best height, best place"
         ),
-    ] = "fixed"
+    ] = "free"
     preload: Annotated[
         float, key("preload_n", "spring force that the policy preload holds", gt=0, le=1e5)
     ] = 30.0

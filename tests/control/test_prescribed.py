@@ -66,7 +66,7 @@ def test_at_rest_it_asks_for_the_static_forces() -> None:
 
 def test_circle_with_a_boundary_layer_on_an_ideal_plant() -> None:
     """Acceptance row 16."""
-    run = followed(SIMULATION, Loop(Gains(reach=0.1, layer=0.01)), seconds=10.0)
+    run = followed(SIMULATION, Loop(Gains(reach=0.1, layer=0.01)))
     assert run.saturated == 0
     assert run.worst.max() < 1e-3
 
@@ -106,7 +106,7 @@ def test_without_the_auxiliary_system_its_state_stays_empty() -> None:
 
 def test_optimised_forces_trade_the_plane_for_the_height() -> None:
     clip, weighted = (
-        followed(SIMULATION, Loop(Gains(reach=0.43, layer=0.0, weight=weight), 2e-3), 6.0).worst
+        followed(SIMULATION, Loop(Gains(reach=0.43, layer=0.0, weight=weight), 2e-3, seconds=6.0)).worst
         for weight in (None, 30.0)
     )
     assert weighted[2] < 0.5 * clip[2]
@@ -114,7 +114,7 @@ def test_optimised_forces_trade_the_plane_for_the_height() -> None:
 
 
 def test_restored_height_leaves_the_windows() -> None:
-    run = followed(SIMULATION, Loop(Gains(reach=0.43, layer=0.0, vertical=True), 1e-3), seconds=2.0)
+    run = followed(SIMULATION, Loop(Gains(reach=0.43, layer=0.0, vertical=True), 1e-3, seconds=2.0))
     window = SIMULATION.forces
     assert run.tension[:, :3].min() < window.lower_min - 0.01 or run.tension[:, :3].max() > window.lower_max
 
@@ -146,5 +146,5 @@ def test_delay_costs_speed_times_delay_until_it_costs_stability(
     delay: int, greatest: float, least: float
 ) -> None:
     """10, 30 and 60 ms at 500 Hz on the circle of 6.28 mm/s."""
-    worst = followed(SIMULATION, Loop(Gains(), 2e-3, delay=delay), seconds=6.0).worst.max()
+    worst = followed(SIMULATION, Loop(Gains(), 2e-3, delay=delay, seconds=6.0)).worst.max()
     assert least < worst < greatest

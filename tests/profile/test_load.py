@@ -125,3 +125,10 @@ def test_missing_and_unknown_sections_are_told():
     _, problems = validate(table)
     assert {problem.key: problem.hint for problem in problems}["beds"] == "did you mean 'bed'?"
     assert "bed" in {problem.key for problem in problems}
+
+
+def test_where_the_upper_platform_stands_unless_the_profile_says(broken):
+    """Free for a machine that prints; the columns of the paper stay what they are."""
+    assert open_profile(broken(policy="")).spring.policy == "free"
+    told = {name: open_profile(name).spring.policy for name in NAMES}
+    assert told == {"paper": "fixed", "paper-simulation": "fixed", "paper-wide": "free"}

@@ -113,7 +113,7 @@ def _starts(loop: Loop) -> tuple[Loop, ...]:
 
 
 def _noises(loop: Loop) -> tuple[Loop, ...]:
-    return tuple(replace(loop, seed=seed) for seed in range(2, 12))
+    return tuple(replace(loop, seed=seed) for seed in range(2, 7))
 
 
 def _rates(loop: Loop) -> tuple[Loop, ...]:
