@@ -70,6 +70,12 @@ class Planner:
         """Stretches that a further command settles."""
         yield from self._take(command)
 
+    def advance(self) -> Iterator[Stretch]:
+        """What is settled of the current leg, however little was drawn since the last look."""
+        leg = self._leg.plan(closes=False)
+        if leg is not None:
+            yield leg
+
     def close(self) -> Iterator[Stretch]:
         """Bring the current leg to rest."""
         leg = self._leg.plan(closes=True)

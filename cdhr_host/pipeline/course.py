@@ -28,6 +28,8 @@ class Stop:
     """of the plan, the first after the row that stands"""
     pause: Pause | None
     """None at the plan's end"""
+    waits: bool = False
+    """whether the plan goes on when further commands come"""
 
 
 @dataclass(frozen=True, slots=True)

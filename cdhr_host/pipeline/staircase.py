@@ -10,7 +10,7 @@ from cdhr_host.errors import MotionError, Problem
 from cdhr_host.extrusion import AirStage, air_command
 from cdhr_host.mechanism import UpperMotion
 from cdhr_host.motion.leg import AS_PROGRAMMED, FeedOverride
-from cdhr_host.motion.limits import profile_shaper
+from cdhr_host.motion.limits import MotionLimits, profile_shaper
 from cdhr_host.motion.planner import Planner
 from cdhr_host.motion.sampling import Stand, Timed, Timeline
 from cdhr_host.motion.shaping import Shaper
@@ -111,6 +111,11 @@ class Staircase:
             yield self._timeline.rest(self._planner.standing)
             self._airless_since = self.tick
 
+    def advanced(self) -> Iterator[Timed]:
+        """Stretches that all commands so far settle, without waiting for more of them."""
+        for stretch in self._planner.advance():
+            yield self._timeline.lay(stretch)
+
     def _awaited(self) -> Iterator[Timed]:
         """Stand before the first clay for as long as the air needs to be ready for it."""
         for stretch in self._planner.close():
@@ -159,6 +164,15 @@ class Staircase:
         return self._planner.standing.at_G
 
     @property
+    def upper(self) -> Array:
+        """(3,) m, where the upper platform stands then."""
+        return self._planner.standing.at_G - self.rig.cables.reference_G + self._offset
+
+    def reads_with(self, other: "Staircase") -> bool:
+        """Whether what one reads is in force for the other."""
+        return self._interpreter is other._interpreter
+
+    @property
     def tick(self) -> int:
         """The first that is not planned yet."""
         return self._timeline.tick
@@ -172,6 +186,11 @@ class Staircase:
     def period(self) -> float:
         """s between two ticks"""
         return self._period
+
+    @property
+    def limits(self) -> MotionLimits:
+        """What bounds the nozzle's motion."""
+        return self._limits
 
     @property
     def shaper(self) -> Shaper:

@@ -1,0 +1,74 @@
+"""A course whose commands come while it is played.
+
+It is planned as a file's is, as far as what has come settles it. What is not settled waits for
+more; only when playback needs it, the leg is closed: then the plan stands after the last
+command, and goes on from there when more have come.
+"""
+
+from collections.abc import Iterator, Sequence
+
+from cdhr_host.pipeline.course import Course, Stop
+from cdhr_host.pipeline.staircase import Staircase
+from cdhr_host.pipeline.tape import Tape
+from cdhr_host.values import Blend, Command, Notice, Pause
+from cdhr_host.values import Stop as ExactStop
+
+
+class ArrivingTape(Tape):
+    """Commands so far; what is not there yet is None and may come later."""
+
+    def __init__(self) -> None:
+        super().__init__(iter(()))
+
+    def add(self, commands: Sequence[Command]) -> None:
+        """Further commands."""
+        self._kept.extend(commands)
+
+
+class Arriving(Course):
+    """Commands in by ``add``; it stands at a ``Stop`` that waits whenever they run out."""
+
+    def __init__(self, staircase: Staircase) -> None:
+        self._arrived = ArrivingTape()
+        super().__init__(staircase, self._arrived)
+        self._rests = True
+        self._opened = False
+
+    @property
+    def rests(self) -> bool:
+        """Whether all that has come is planned and ends at rest."""
+        return self._rests and self._arrived.at(self._at) is None
+
+    def add(self, commands: Sequence[Command]) -> None:
+        """Further commands, planned as far as they settle it."""
+        self._arrived.add(commands)
+        self._settle()
+
+    def plan(self, until: int) -> None:
+        """Plan on up to a tick; where commands run out before it, up to rest."""
+        self._settle()
+        if not self._rests and self.staircase.tick <= until:
+            self._placing(self._place(self.staircase.closed(ends=False)))
+            self.stops.append(Stop(self.staircase.tick, None, waits=True))
+            self._rests = True
+        self._arrived.forget(min(self._at, self.oldest))
+
+    def _settle(self) -> None:
+        before = self._at
+        while (command := self._arrived.at(self._at)) is not None:
+            if not self._opened:
+                self._placing(self._place(self.staircase.opened()))
+                self._opened = True
+            self._marks.append((self._at, self.staircase.fork(self.staircase.feed_override)))
+            self._placing(self._place(self.staircase.settled(command)))
+            self._placing(self._told(command))
+            self._at += 1
+            if not isinstance(command, Notice | Blend | ExactStop):
+                self._rests = isinstance(command, Pause)
+        if self._at > before:
+            self._placing(self._place(self.staircase.advanced()))
+
+    @staticmethod
+    def _placing(steps: Iterator[object]) -> None:
+        for _ in steps:
+            pass
