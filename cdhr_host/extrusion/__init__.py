@@ -2,7 +2,7 @@
 
 from cdhr_host.extrusion.lead import AirStage
 from cdhr_host.extrusion.material import bores, clay_findings, flow_law
-from cdhr_host.extrusion.model import AirModel
+from cdhr_host.extrusion.model import AirModel, ticks
 from cdhr_host.extrusion.pressure import AirCommand, air_command
 from cdhr_host.extrusion.rheology import Channel, ChannelFlow, LinearFlow, Material, PressureFlow
 
@@ -19,4 +19,5 @@ __all__ = [
     "bores",
     "clay_findings",
     "flow_law",
+    "ticks",
 ]

@@ -12,6 +12,7 @@ dead time of its own: when it is the longer one, the last levels cannot be sent 
 level before them lasts, which the inverse allows for.
 """
 
+import copy
 from dataclasses import fields, replace
 from itertools import pairwise
 from typing import Any, ClassVar, Final, Generic, Protocol, Self, TypeVar
@@ -100,6 +101,12 @@ class AirStage(Generic[R]):
         flow = np.concatenate((self._flow(rows), np.zeros(self.lead + self._ahead)))
         self._arrive(end + max(self._open, self._close), flow)
         return self._sent()
+
+    def fork(self) -> "AirStage[R]":
+        """This stage as it is now, to go on apart from it."""
+        other = copy.copy(self)
+        other._past = copy.copy(self._past)
+        return other
 
     def restart(self, tick: int) -> None:
         """Forget rows from ``tick`` on: others come in their place. What was sent before stays sent.

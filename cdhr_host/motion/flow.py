@@ -46,9 +46,17 @@ class FlowLimits:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(np.minimum(1.0, np.where(clay > 0.0, allowed / (clay * acceleration), 1.0)))
 
+    def slowest(self, flow: float) -> float:
+        """m³/s -> s: the time its greatest change takes from nothing to a flow."""
+        return flow / float(np.interp(flow, self.flow, self.change))
+
     def jumps(self, clay: Array, before: float) -> Flags:
         """(M,) whether the clay per metre changes where each segment begins; ``before`` them it was that."""
         if not self.rests:
             return np.zeros(len(clay), dtype=np.bool_)
         earlier = np.concatenate(([before], clay[:-1]))
         return np.asarray(np.abs(clay - earlier) > SAME * np.maximum(clay, earlier))
+
+
+UNBOUNDED: Final = FlowLimits()
+"""Air that pushes anything."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.mechanism import UpperBounds
-from cdhr_host.motion.flow import FlowLimits
+from cdhr_host.motion.flow import UNBOUNDED, FlowLimits
 from cdhr_host.motion.shaping import Shaper, shaper
 from cdhr_host.motion.smooth_path import SmoothPath
 from cdhr_host.profile import Profile
@@ -44,8 +44,6 @@ CHORD_ERROR = 1e-6
 
 FOLLOWING = UpperBounds(1.0, 0.0, 0.0)
 """An upper platform at a constant offset."""
-UNBOUNDED = FlowLimits()
-"""Air that pushes anything."""
 
 
 def _too_slow_sliders(speed: float) -> Problem:

@@ -4,25 +4,26 @@ A ramp by dr of a plan that cruises at v keeps A and J when it lasts
     D >= 15/8 dr v / A   and   D >= sqrt(10/sqrt(3) dr v / J).
 Where the plan itself uses A and J there is less room, so durations about this bound and
 moments to begin are tried, soonest settled first; each is measured by finite differences of
-the rows it would make, together with those before it. A plan at J all the time is given the
-slowest ramp, or one that begins once it lets go.
+the rows it would make, together with those before it. A plan at J or A all the time may have room
+for none of them; a smaller change then makes room for the rest of it, since r³ j and r² a
+shrink with r.
 """
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from cdhr_host.motion.flow import UNBOUNDED, FlowLimits
 from cdhr_host.motion.hold import RATE_CURVATURE, RATE_SLOPE
 from cdhr_host.motion.playback import Pace, played
 from cdhr_host.motion.smooth_path import norms
 from cdhr_host.profile.schema import Profile
 from cdhr_host.values import Array, Setpoints, ToolTrack
 
-STRETCHES: Final = (0.35, 0.5, 0.7, 0.85, 1.0, 1.1, 1.25, 1.45, 1.75, 2.2, 3.0, 4.5, 7.0)
+STRETCHES: Final = (0.35, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.45, 1.7, 2.0, 2.5, 3.2, 4.5, 7.0)
 """durations tried, of the bound for cruising"""
 WAITS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0)
 """moments tried, of the longest time a plan takes to turn its acceleration round"""
@@ -40,14 +41,6 @@ Nozzle = Callable[[Array], ToolTrack]
 """(N,) ticks of the plan -> the nozzle at them, as planned"""
 Make = Callable[[int, int], Pace]
 """ticks to wait, ticks to last -> the pace from then on"""
-
-
-@dataclass(frozen=True, slots=True)
-class Choice:
-    """A pace that may be played, and the greatest share of a limit that its rows use."""
-
-    pace: Pace
-    excess: float
 
 
 def turning_time(profile: Profile) -> float:
@@ -76,7 +69,14 @@ def bound(profile: Profile, nozzle: float, slider: float, change: float) -> floa
 class Ahead:
     """The plan that lies ahead, and the rows before it, ready to be played in many ways."""
 
-    def __init__(self, plan: Setpoints, before: Setpoints, nozzle: Nozzle, profile: Profile) -> None:
+    def __init__(
+        self,
+        plan: Setpoints,
+        before: Setpoints,
+        nozzle: Nozzle,
+        profile: Profile,
+        flow: FlowLimits = UNBOUNDED,
+    ) -> None:
         """``plan``: rows of consecutive plan ticks; ``before``: the last rows already fed."""
         self.profile = profile
         self._nozzle = nozzle
@@ -89,6 +89,8 @@ class Ahead:
         self._limits = np.maximum(_limits(profile), demands)
         self.speeds = float(demands[0]), float(demands[3])
         """m/s: the greatest of the nozzle and of a slider"""
+        self.pushing = flow.slowest(float(plan.flow.max(initial=0.0)))
+        """s: the shortest time in which the air makes the greatest flow from nothing"""
 
     def excess(self, pace: Pace, first: int) -> float:
         """The greatest share of a limit used by the rows from tick ``first`` on; infinite going backwards."""
@@ -110,22 +112,17 @@ class Ahead:
 
 def choices(
     ahead: Ahead, make: Make, first: int, change: float, *, waits: Sequence[float] = WAITS
-) -> Iterator[Choice]:
-    """Paces from tick ``first`` on: those that keep the limits, soonest settled first; then the rest."""
+) -> Iterator[Pace]:
+    """Paces from tick ``first`` on that keep the limits, soonest settled first."""
     period, profile = ahead.profile.drives.period, ahead.profile
     least = bound(profile, *ahead.speeds, max(change, 1e-3)) / period
     begins = sorted({round(share * turning_time(profile) / period) for share in waits})
     lasting = sorted({max(SHORTEST, math.ceil(stretch * least)) for stretch in STRETCHES})
     pairs = sorted(((wait, last) for wait in begins for last in lasting), key=lambda pair: (sum(pair), pair))
-    others = []
     for wait, last in pairs:
         pace = make(wait, last)
-        found = Choice(pace, ahead.excess(pace, first))
-        if found.excess <= 1.0 + ROUNDING:
-            yield found
-        else:
-            others.append(found)
-    yield from sorted(others, key=lambda each: each.excess)
+        if ahead.excess(pace, first) <= 1.0 + ROUNDING:
+            yield pace
 
 
 def _limits(profile: Profile) -> Array:

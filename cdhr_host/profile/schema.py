@@ -155,6 +155,17 @@ class Extruder(Section):
     ] = 150.0 * MM
 
 
+class Job(Section):
+    """[job]: how a print is held."""
+
+    hold: Annotated[
+        Literal["clean", "prompt"],
+        Field(
+            description="clean: a change of pace waits until the air can follow it; prompt: at once, the clay late"
+        ),
+    ] = "clean"
+
+
 class Air(Section):
     """[air]: which words open and close the air besides E; each is ``ignore`` or ``air``."""
 
@@ -287,6 +298,7 @@ class Profile(Section):
     bed: Bed
     extruder: Extruder
     clay: Clay = Clay()
+    job: Job = Job()
     air: Air
     drives: Drives
     canopen: CanOpen
