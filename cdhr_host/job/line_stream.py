@@ -1,0 +1,216 @@
+"""Lines of a client on their way into a running print.
+
+Clients offer lines from any thread; the printer's thread reads them when the plan needs more.
+Reading a line proves what can be proven of it alone: words, places, forces at rest, cables'
+way. What is planned is looked at tick by tick before it is fed, well ahead of the machine.
+"""
+
+import math
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Final
+
+from cdhr_host.errors import CdhrError, MotionError, Problem
+from cdhr_host.job.surface import Progress
+from cdhr_host.pipeline import Staircase
+from cdhr_host.pipeline.arriving import Arriving
+from cdhr_host.pipeline.foreseen import Foresight
+from cdhr_host.values import Command, Moves
+
+AHEAD: Final = 3.0
+"""s of real time planned ahead; a client that pauses is obeyed that late"""
+WAITING_MAX: Final = 64
+"""lines not read yet while the plan needs more"""
+WAITING_FULL: Final = 8
+"""the same while it does not: more than any client has in flight"""
+TOGETHER: Final = 16
+"""short lines read at once"""
+SHORT: Final = 0.1
+"""s a line lasts that counts as short"""
+PATIENCE: Final = 0.1
+"""s of real time without a line after which the plan is brought to rest"""
+MARGIN: Final = 4
+"""ticks of the plan that are not fed while more may come"""
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """A line not read yet."""
+
+    text: str
+    typed: bool
+
+
+class LineStream:
+    """A ``LineFeed``; ``now`` is real time, s, ``speed`` the machine's clock against it."""
+
+    def __init__(
+        self,
+        name: str,
+        machine: Staircase,
+        tell: Callable[[Problem], None],
+        now: Callable[[], float],
+        speed: float,
+    ) -> None:
+        self.name = name
+        self.began = now()
+        machine.restore(replace(machine.modal, lines=0, ended=False, warned=frozenset()))
+        self.course = Arriving(machine.fork())
+        self.refusal: Problem | None = None
+        """of the line that the print stands before"""
+        self.blocked = False
+        """whether what is planned cannot be moved: nothing but an end is possible"""
+        self._machine = machine
+        self._foresight = Foresight(machine)
+        self._tell, self._now = tell, now
+        self._ahead = AHEAD * min(speed, 1000.0) / machine.period
+        self._lock = threading.Lock()
+        self._waiting: deque[Waiting] = deque()
+        self._room = WAITING_MAX
+        self._offered = 0
+        self._done = 0
+        self._together = TOGETHER
+        self._heard = self.began
+        self._finished = False
+        self._seen = self.course.first
+
+    def offer(self, line: str, *, typed: bool = False) -> bool:
+        """Take one line of G-code; False while there is no room. From any thread."""
+        with self._lock:
+            if len(self._waiting) >= self._room:
+                return False
+            self._waiting.append(Waiting(" ".join(line.split("\n")), typed))
+            self._offered += 1
+            self._heard = self._now()
+        return True
+
+    @property
+    def pending(self) -> int:
+        """Lines taken whose motion has not ended."""
+        return max(self._offered - self._done, 0)
+
+    def finish(self) -> None:
+        """No more lines."""
+        self._finished = True
+
+    @property
+    def over(self) -> bool:
+        """Whether no more lines come and all there were are planned."""
+        return self._finished and self.drained
+
+    @property
+    def drained(self) -> bool:
+        """Whether all lines are planned, up to rest."""
+        return not self._waiting and self.course.rests
+
+    @property
+    def patient(self) -> bool:
+        """Whether further lines may still come in time."""
+        return not self._finished and self._now() - self._heard < PATIENCE
+
+    def read(self, played: float) -> None:
+        """Read lines while less than ``AHEAD`` is planned beyond ``played``, a tick of the plan."""
+        self._room = WAITING_MAX
+        while self.refusal is None and self._waiting:
+            if self.course.staircase.tick - played >= self._ahead:
+                self._room = WAITING_FULL
+                return
+            with self._lock:
+                batch = [self._waiting.popleft() for _ in range(min(self._together, len(self._waiting)))]
+            self._take(batch)
+
+    def look(self) -> bool:
+        """Prove what is planned tick by tick; False when it cannot be moved. Raises nothing for that."""
+        end = self.course.staircase.tick
+        if end <= self._seen or self.blocked:
+            return not self.blocked
+        try:
+            self.course.rows(self._seen, end)
+        except MotionError as error:
+            self.blocked = True
+            self.refusal = error.problems[0]
+            self._tell(replace(self.refusal, hint="this print cannot go on: cancel it"))
+            return False
+        self._seen = end
+        return True
+
+    def most(self, u: float) -> int | None:
+        """Ticks that may be fed from a time of the plan on without bringing it to rest; None for all."""
+        if self.course.rests or self.course.stop() is not None:
+            return None
+        return max(math.floor(self.course.staircase.tick - u) - MARGIN, 0)
+
+    def executed(self, line: int, *, at_rest: bool) -> None:
+        """A line is being executed; ``at_rest`` when all that is planned was."""
+        resting = at_rest and self.drained
+        self._done = self._offered if resting else max(self._done, min(line - 1, self._offered))
+
+    def go_on(self) -> None:
+        """The operator lets a refused line be left out."""
+        self.refusal = None
+
+    def progress(self, now: float, line: int, *, printing: float) -> Progress:
+        """As of a program whose end is not known."""
+        return Progress(
+            file=self.name,
+            lines=self._offered,
+            line=line,
+            position=0,
+            size=0,
+            layer=self._machine.modal.layer,
+            layers=0,
+            elapsed=now,
+            printing=printing,
+            left=0.0,
+            duration=0.0,
+            extruded=0.0,
+            total=0.0,
+        )
+
+    def _take(self, batch: list[Waiting]) -> None:
+        """Read lines; one by one where together they are refused."""
+        before = self._machine.modal
+        problem, commands = self._read("".join(f"{each.text}\n" for each in batch))
+        if problem is None:
+            self.course.add(commands)
+            lasting = sum(map(_duration, commands)) / len(batch)
+            self._together = TOGETHER if lasting < SHORT else 1
+            return
+        self._machine.restore(before)
+        if len(batch) == 1:
+            self._refuse(batch[0], problem)
+            return
+        for k, each in enumerate(batch):
+            self._take([each])
+            if self.refusal is not None:
+                with self._lock:
+                    self._waiting.extendleft(reversed(batch[k + 1 :]))
+                return
+
+    def _read(self, text: str) -> tuple[Problem | None, list[Command]]:
+        commands: list[Command] = []
+        try:
+            commands += self._machine.commands([text.encode("latin-1", "replace")])
+        except CdhrError as error:
+            return error.problems[0], []
+        problems = self._foresight.problems(commands)
+        return (problems[0] if problems else None), commands
+
+    def _refuse(self, line: Waiting, problem: Problem) -> None:
+        """A line is told to be refused; the print stands before the next, unless it was typed alone."""
+        modal = self._machine.modal
+        self._machine.restore(replace(modal, lines=modal.lines + 1))
+        if not line.typed:
+            self.refusal = problem
+        self._tell(problem)
+
+
+def _duration(command: Command) -> float:
+    """s a command asks for, roughly."""
+    if not isinstance(command, Moves):
+        return 0.0
+    steps = command.end_G[1:] - command.end_G[:-1]
+    way = float(abs(command.end_G[0] - command.start_G).sum() + abs(steps).sum())
+    return way / max(float(command.speed.max()), 1e-6)
