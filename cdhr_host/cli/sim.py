@@ -37,22 +37,34 @@ def sim(
         Path | None,
         typer.Option(metavar="CSV", help="At the end write what the drives received, and a report beside."),
     ] = None,
+    trace: Annotated[
+        Path | None,
+        typer.Option(metavar="CSV", help="At the end write where the sliders were, period by period."),
+    ] = None,
 ) -> None:
-    """Be six drives, a pressure regulator and the machine behind them, until interrupted."""
-    from cdhr_host.drives.sim.serve import Terminal, keep_record, serve
+    """Be six drives, a pressure regulator and the machine behind them, until interrupted.
+
+    SIGUSR1 pulls the plug: the line is gone, the drives and the machine go on by themselves.
+    """
+    from cdhr_host.drives.sim.serve import Terminal, keep_record, keep_trace, serve
 
     machine = open_machine(profile, material)
     stopped: list[int] = []
+    pulled: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda n, _: stopped.append(n))
+    signal.signal(signal.SIGUSR1, lambda n, _: pulled.append(n))
     with writing(link or Path("pseudo-terminal")), Terminal(link) as terminal:
         far = _far(bus, machine)
         rate = "1000000" if bus == "slcan" else "921600"
         emit(f"{bus}:{terminal.link or terminal.path}@{rate}")
-        serve(terminal, far, lambda: bool(stopped))
+        serve(terminal, far, lambda: bool(stopped), lambda: bool(pulled))
     if record is not None:
         with writing(record):
             keep_record(far, record)
+    if trace is not None:
+        with writing(trace):
+            keep_trace(far, trace)
     emit(json.dumps(far.report()))
 
 
@@ -60,6 +72,7 @@ def _far(bus: str, machine: "Profile") -> "Serial":
     import time
 
     from cdhr_host.drives.sim.bridge import Bridge
-    from cdhr_host.drives.sim.serve import SlcanStation
+    from cdhr_host.drives.sim.serve import GRACE, SlcanStation
 
-    return (SlcanStation if bus == "slcan" else Bridge)(machine, time.monotonic())
+    now = time.monotonic()
+    return SlcanStation(machine, now) if bus == "slcan" else Bridge(machine, now, grace=GRACE)

@@ -46,7 +46,8 @@ STANDING: Final = (State.BOOT, State.IDLE, State.FAULT)
 class Bridge:
     """Bytes in, bytes out, outputs in between.
 
-    ``received`` has each output once: six position units and the pressure. An output more
+    ``received`` has each output once: six position units and the pressure; ``trace`` the time,
+    six real positions, the pressure and whether it was an output of the plan. An output more
     than a period and ``grace`` s late is a fault, not played in a burst.
     """
 
@@ -57,6 +58,7 @@ class Bridge:
         self.state = State.BOOT
         self.code = Code.NONE
         self.received: list[Tick] = []
+        self.trace: list[tuple[float, ...]] = []
         self.estop = False
         self.gaps = self.late = 0
         self.air = 0
@@ -252,7 +254,7 @@ class Bridge:
             self._due += self._period
             self._step()
         if self.air and now - self._executed_at > self._limits.hold + 1e-9:
-            self.air = 0
+            self._vent()
 
     def _step(self) -> None:
         """One output, or the end of them."""
@@ -280,7 +282,12 @@ class Bridge:
     def _rest(self, state: State) -> None:
         self._due, self.state = None, state
         if state is not State.RUN:
+            self._vent()
+
+    def _vent(self) -> None:
+        if self.air:
             self.air = 0
+            self.trace.append((self._now, *self._motors.position, 0, False))
 
     def _execute(self, tick: Tick) -> None:
         self.air = tick[12]
@@ -289,6 +296,8 @@ class Bridge:
             (*tick[:6], *self._motors.position, *self._motors.torque, self._motors.pressure)
         )
         self.received.append((*tick[:6], tick[12]))
+        fresh = self.state is not State.STOPPING
+        self.trace.append((self._executed_at, *self._motors.position, tick[12], fresh))
         self._output += 1
         if beyond is not None:
             self._trip(Code.FOLLOWING, beyond)

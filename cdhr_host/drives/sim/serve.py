@@ -37,6 +37,11 @@ class Serial(Protocol):
         """Six position units and the raw pressure of each executed setpoint."""
         ...
 
+    @property
+    def trace(self) -> list[tuple[float, ...]]:
+        """Each period: monotonic time, six real positions, raw pressure, whether setpoints were fresh."""
+        ...
+
 
 class SlcanStation:
     """A station behind a serial CAN adapter."""
@@ -65,12 +70,18 @@ class SlcanStation:
         """See ``Serial``."""
         return self.station.received
 
+    @property
+    def trace(self) -> list[tuple[float, ...]]:
+        """See ``Serial``."""
+        return self.station.trace
+
 
 class Terminal:
     """A pseudo-terminal; ``path`` is what the host opens, ``link`` a symbolic link to it."""
 
     def __init__(self, link: Path | None = None) -> None:
         self.fd, self._slave = os.openpty()
+        self._plugged = True
         tty.setraw(self._slave)
         os.set_blocking(self.fd, False)
         self.path = os.ttyname(self._slave)
@@ -86,30 +97,45 @@ class Terminal:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        os.close(self.fd)
-        os.close(self._slave)
+        self.unplug()
         if self.link is not None:
             self.link.unlink(missing_ok=True)
 
+    def unplug(self) -> None:
+        """The plug is pulled: nobody hears anything any more."""
+        if self._plugged:
+            self._plugged = False
+            os.close(self.fd)
+            os.close(self._slave)
+
     def read(self) -> bytes:
         """What the host wrote; waits for IDLE at most."""
+        if not self._plugged:
+            time.sleep(IDLE)
+            return b""
         ready, _, _ = select.select([self.fd], [], [], IDLE)
         return os.read(self.fd, 65536) if ready else b""
 
     def write(self, data: bytes) -> None:
         """To the host; what it does not take is lost, as on a bus."""
+        if not self._plugged:
+            return
         try:
             os.write(self.fd, data)
         except BlockingIOError:
             return
 
 
-def serve(terminal: Terminal, far: Serial, stopped: Callable[[], bool]) -> None:
-    """Be the far side until ``stopped``."""
+def serve(
+    terminal: Terminal, far: Serial, stopped: Callable[[], bool], unplugged: Callable[[], bool]
+) -> None:
+    """Be the far side until ``stopped``, behind a plug that is pulled once ``unplugged``."""
     gc.collect()
     gc.freeze()
     _hurry()
     while not stopped():
+        if unplugged():
+            terminal.unplug()
         data = terminal.read()
         answer = far.exchange(time.monotonic(), data)
         if answer:
@@ -123,6 +149,13 @@ def keep_record(far: Serial, path: Path) -> None:
     lines = [",".join(columns), *(",".join(map(str, row)) for row in far.record())]
     path.write_text("\n".join(lines) + "\n", encoding="ascii")
     path.with_suffix(".json").write_text(json.dumps(far.report()) + "\n", encoding="ascii")
+
+
+def keep_trace(far: Serial, path: Path) -> None:
+    """Write what the simulated machine did, period by period, as CSV."""
+    header = ",".join(["time_s", *(f"slider{k + 1}_counts" for k in range(6)), "pressure_raw", "fresh"])
+    rows = (f"{row[0]:.6f}," + ",".join(str(int(value)) for value in row[1:]) for row in far.trace)
+    path.write_text("\n".join([header, *rows]) + "\n", encoding="ascii")
 
 
 def _hurry() -> None:

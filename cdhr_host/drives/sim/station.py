@@ -30,7 +30,8 @@ class Station:
     """The far side of the bus.
 
     ``received`` has six position units and the raw pressure of each cycle in which all six
-    axes followed a fresh setpoint, ``lost`` counts cycles in which an axis had to guess.
+    axes followed a fresh setpoint, ``trace`` has time, six real positions, the raw pressure and
+    whether the setpoints were fresh for every cycle. ``lost`` counts cycles in which an axis had to guess.
     Silence is judged ``grace`` s late, for wires that deliver late themselves.
     ``inbound`` and ``outbound`` stand for the wire: each frame becomes none, one or more.
     """
@@ -44,6 +45,7 @@ class Station:
         self.drives = [Drive(k + 1, self.period) for k in range(6)]
         self.coupler = Coupler(7)
         self.received: list[tuple[int, ...]] = []
+        self.trace: list[tuple[float, ...]] = []
         self.syncs = 0
         self.inbound: Filter = untouched
         self.outbound: Filter = untouched
@@ -159,6 +161,9 @@ class Station:
         for drive, position, torque in zip(self.drives, positions, torques, strict=True):
             drive.moved(int(position), int(torque))
         self.coupler.measured(self._raw(feedback))
+        if len(self.trace) < LIMIT:
+            fresh = all(drive.following and drive.fresh for drive in self.drives)
+            self.trace.append((now, *positions.tolist(), self.coupler.output, fresh))
 
     def _row(self) -> Setpoints:
         slider = np.array([[(drive.commanded + drive.shift) * self._unit for drive in self.drives]])
