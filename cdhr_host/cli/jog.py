@@ -1,14 +1,17 @@
 """``cdhr jog``: move the machine by keys and typed G-code."""
 
 import sys
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cdhr_host.cli.interrupt import StopRequest
 from cdhr_host.cli.machine import SIMULATED, open_machine, opened
 from cdhr_host.cli.options import DrivesUrl, MaterialName, ProfileName, examples
-from cdhr_host.cli.refusals import emit
+from cdhr_host.cli.refusals import INTERRUPTED, emit
+
+if TYPE_CHECKING:
+    from cdhr_host.job.printer import Printer
 
 EXAMPLES = examples(
     "cdhr jog",
@@ -26,19 +29,39 @@ def jog(
         float, typer.Option(metavar="X", help="Run the simulated drives X times faster.", min=0.01)
     ] = 1.0,
 ) -> None:
-    """Jog: arrow keys, PgUp, PgDn and typed G-code; every line is proven before it moves.
+    """Jog: a screen with keys and typed G-code on a terminal; lines of G-code from a pipe.
 
-    Standard input that is no terminal is read as lines of G-code, each answered with ok and
-    the position, or with its refusal.
+    From a pipe each line is proven before it moves and answered with ok and the position, or
+    with its refusal; the exit code is that of the first refusal. Ctrl-C stops on the path.
     """
-    from cdhr_host.console import Session, from_keys, from_lines
-    from cdhr_host.pipeline import Staircase
+    from cdhr_host.job.printer import Printer
 
     machine = open_machine(profile, material)
     link, clock = opened(drives, machine, speed)
     try:
-        session = Session(Staircase(machine), link, clock, stops=StopRequest)
-        code = from_keys(session) if sys.stdin.isatty() else from_lines(session, sys.stdin, emit)
+        printer = Printer(link, clock)
+        printer.begin()
+        try:
+            code = _screen(printer) if sys.stdin.isatty() else _lines(printer)
+        finally:
+            printer.close()
     finally:
         link.close()
     raise typer.Exit(code)
+
+
+def _screen(printer: "Printer") -> int:
+    """Keys, until the operator quits; always 0: refusals were shown."""
+    from cdhr_host.console.desk import Desk
+
+    Desk(printer).run()
+    return 0
+
+
+def _lines(printer: "Printer") -> int:
+    """Lines from standard input."""
+    from cdhr_host.console import from_lines
+
+    with StopRequest() as stop:
+        code = from_lines(printer, sys.stdin, emit, stop)
+    return INTERRUPTED if stop.asked else code

@@ -1,6 +1,5 @@
-"""The jog console: keys and typed G-code through the same staircase as a print."""
+"""The operator's consoles: a screen of the terminal, and lines from a pipe."""
 
-from cdhr_host.console.session import Reply, Session
-from cdhr_host.console.terminal import from_keys, from_lines
+from cdhr_host.console.lines import from_lines
 
-__all__ = ["Reply", "Session", "from_keys", "from_lines"]
+__all__ = ["from_lines"]

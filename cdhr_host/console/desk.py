@@ -73,7 +73,7 @@ class Desk(App[None]):
         super().__init__()
         self._surface = surface
         self._history = History(history or history_file())
-        self._jogging = Jogging(surface, self.run_code)
+        self._jogging = Jogging(surface, self._answered)
         self._unlisten: Callable[[], None] = lambda: None
         self._leaving = False
         self._prompt = ""

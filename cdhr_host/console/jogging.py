@@ -5,19 +5,18 @@ the printer's lease: each press or repeat renews it, and when none comes the mot
 """
 
 from collections.abc import Callable
+from concurrent.futures import Future
 from typing import Final
 
 import numpy as np
 
-from cdhr_host.job.surface import Surface
-from cdhr_host.units import MINUTE, MM
+from cdhr_host.job.surface import Reply, Surface
+from cdhr_host.units import MM
 from cdhr_host.values import Array
 
 STEPS_MM: Final = (0.1, 1.0, 10.0, 100.0)
 SPEEDS_MM_S: Final = (1.0, 5.0, 20.0, 50.0)
 """of continuous motion, beside the steps"""
-STEP_SPEED: Final = 25 * MM
-"""m/s of a single step"""
 AXES: Final = {
     "right": (0, 1),
     "left": (0, -1),
@@ -32,10 +31,10 @@ AXES: Final = {
 class Jogging:
     """What a jog key does now."""
 
-    def __init__(self, surface: Surface, run: Callable[[str], None]) -> None:
-        """``run`` takes a line of G-code as if it had been typed."""
+    def __init__(self, surface: Surface, answered: Callable[["Future[Reply]"], None]) -> None:
+        """``answered`` is told what became of each step."""
         self._surface = surface
-        self._run = run
+        self._answered = answered
         self._size = 1
         self.continuous = False
 
@@ -59,17 +58,19 @@ class Jogging:
         """A jog key was pressed, or repeated itself."""
         axis, sign = AXES[key]
         if self.continuous:
-            self._surface.jog(self._velocity(axis, sign))
+            self._surface.jog(_along(axis, sign * SPEEDS_MM_S[self._size] * MM))
         else:
-            step = sign * STEPS_MM[self._size]
-            self._run(f"G91\nG1 {'XYZ'[axis]}{step:g} F{STEP_SPEED / MM * MINUTE:g}\nG90")
+            step = _along(axis, sign * STEPS_MM[self._size] * MM)
+            self._surface.step(step).add_done_callback(self._answered)
 
     def release(self) -> None:
         """End continuous motion now: the key is known to be up, or nobody looks."""
         if self.continuous:
             self._surface.jog(np.zeros(3))
 
-    def _velocity(self, axis: int, sign: int) -> Array:
-        velocity = np.zeros(3)
-        velocity[axis] = sign * SPEEDS_MM_S[self._size] * MM
-        return velocity
+
+def _along(axis: int, amount: float) -> Array:
+    """(3,) along one axis."""
+    vector = np.zeros(3)
+    vector[axis] = amount
+    return vector

@@ -10,6 +10,7 @@ import numpy as np
 
 from cdhr_host.drives.link import MachineLink
 from cdhr_host.errors import JobError, MotionError, Problem
+from cdhr_host.job.changes import Changes
 from cdhr_host.job.feeder import Feeder
 from cdhr_host.job.program import Program
 from cdhr_host.pipeline import Proof, Staircase
@@ -17,10 +18,12 @@ from cdhr_host.pipeline.course import Course, Stop
 from cdhr_host.pipeline.score import Gain
 from cdhr_host.pipeline.tape import Tape
 from cdhr_host.units import KPA, MINUTE, MM
-from cdhr_host.values import Feedback, Setpoints
+from cdhr_host.values import Array, Feedback, Setpoints
 
 AHEAD: Final = 1 << 20
 """ticks: more than any typed text has"""
+STEP_SPEED: Final = 25 * MM
+"""m/s of a single step"""
 REFERENCE: Final = 50e-6
 """m from the reference pose that count as standing there"""
 Observer = Callable[[Setpoints, Feedback], None]
@@ -50,6 +53,7 @@ class Player:
         self.link = link
         self.profile = link.profile
         self.feeder = Feeder(link)
+        self.changes = Changes(self.feeder)
         self.staircase = Staircase(link.profile)
         self.kind: Kind | None = None
         self._course: Course | None = None
@@ -120,6 +124,7 @@ class Player:
 
     def turn(self) -> Rest | None:
         """Feed and collect once; what has come to rest. Raises DriveError, MotionError, ProgramError."""
+        self.changes.settle()
         self.feeder.feed()
         self.collect()
         if self.kind is not None and self.feeder.at_rest:
@@ -153,6 +158,14 @@ class Player:
         self._play(kind, course, 1.0)
         return True
 
+    def step(self, distance: Array) -> bool:
+        """Begin one straight move by (3,) m, modes staying as they are. Raises MotionError."""
+        x, y, z = (distance / MM).tolist()
+        text = f"G21\nG91\nG1 X{x:.6f} Y{y:.6f} Z{z:.6f} F{STEP_SPEED / MM * MINUTE:g}\n"
+        course = self._proven(self.staircase.apart(), [text.encode()])
+        self._play(Kind.TYPED, course, 1.0)
+        return True
+
     def lift(self, heights: Iterable[float]) -> float:
         """Begin to go straight up by the first of these heights, m, that can be done; 0 if none can."""
         speed = self.profile.limits.speed_max / 2 / MM * MINUTE
@@ -171,33 +184,42 @@ class Player:
         self._close()
         ended = self.feeder.stop is not None and self.feeder.stop.pause is None
         self.feeder.end()
-        if self.kind in (Kind.PROGRAM, Kind.TYPED) and ended and self._course is not None:
-            self.staircase = self._course.staircase
+        if ended and self._course is not None:
+            self._stand_after(self._course.staircase)
         elif self.feeder.last is not None:
             self.staircase.stand_at(self.feeder.last.nozzle_G[-1], self.feeder.last.upper[-1])
         self.kind = self._course = None
 
+    def _stand_after(self, done: Staircase) -> None:
+        """Stand where all of a course leads, exactly; what it read for itself alone is forgotten."""
+        if done.reads_with(self.staircase):
+            self.staircase = done
+        else:
+            self.staircase.stand_at(done.standing_G, done.upper)
+
     def hold(self) -> None:
         """Come to rest on the path."""
-        self.feeder.hold()
+        late = 0.0
+        self.changes.pace(0.0, late=late)
 
     def go_on(self) -> None:
         """From rest back to speed."""
-        self.feeder.go_on(min(self.feed, 1.0))
+        self.changes.go_on(min(self.feed, 1.0))
 
     def override(self, feed: float | None, flow: float | None, *, moving: bool) -> None:
         """Other shares of feed and flow, at once while a program moves."""
         if feed is not None:
             self.feed = feed
             if moving:
-                self.feeder.pace(min(feed, 1.0))
+                self.changes.pace(min(feed, 1.0))
         if flow is not None:
             self.gain = flow
-            self.feeder.flow(flow)
+            self.changes.flow(flow)
 
     def _play(self, kind: Kind, course: Course, rate: float) -> None:
         share = self.gain if kind is Kind.PROGRAM else 1.0
         self.feeder.begin(course, rate, Gain(share, share))
+        self.changes.begin(rate)
         self.kind, self._course = kind, course
 
     def _proven(self, machine: Staircase, chunks: list[bytes]) -> Course:

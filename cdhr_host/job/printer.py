@@ -140,9 +140,13 @@ class Printer:
 
     def run(self, text: str) -> "Future[Reply]":
         """Typed G-code: proven, then run, one text after the other."""
-        answer: Future[Reply] = Future()
-        self._ask(lambda: self._typed.add(text, answer))
-        return answer
+        ended = text if text.endswith("\n") else f"{text}\n"
+        return self._later(lambda: self._acts.player.typed(ended))
+
+    def step(self, distance: Array) -> "Future[Reply]":
+        """One straight move from where the nozzle stands."""
+        way = np.array(distance, dtype=float)
+        return self._later(lambda: self._acts.player.step(way))
 
     def jog(self, velocity: Array) -> None:
         """Go on so for a lease."""
@@ -181,6 +185,11 @@ class Printer:
     def moving(self) -> bool:
         """Whether anything is being played or asked for."""
         return bool(self._asked) or self._acts.busy or self._typed.busy
+
+    def _later(self, begin: Callable[[], bool]) -> "Future[Reply]":
+        answer: Future[Reply] = Future()
+        self._ask(lambda: self._typed.add(begin, answer))
+        return answer
 
     def _run(self) -> None:
         while not self._ending.is_set():

@@ -147,6 +147,8 @@ class Reply:
     lines: tuple[str, ...]
     """for a person: ``X:.. Y:..`` of M114, or refusals each followed by its hint"""
     problems: tuple[Problem, ...] = ()
+    exit_code: int = 0
+    """what a command ends with that fails for this"""
 
 
 class LineFeed(Protocol):
@@ -238,6 +240,10 @@ class Surface(Protocol):
         in HELD are refused unless they come back before ``resume`` (the printer takes care: it
         returns to the held point first). Never raises for bad text: the reply says it.
         """
+        ...
+
+    def step(self, distance: Array) -> "Future[Reply]":
+        """(3,) m: one straight move from where the nozzle stands; as ``run``, modes stay as they are."""
         ...
 
     def jog(self, velocity: Array) -> None:

@@ -1,6 +1,7 @@
 """Typed G-code and jogs: what moves the machine while no program does."""
 
 from collections import deque
+from collections.abc import Callable
 from concurrent.futures import Future
 
 from cdhr_host.errors import CdhrError, Problem
@@ -15,7 +16,7 @@ class Typed:
 
     def __init__(self, player: Player) -> None:
         self._player = player
-        self._waiting: deque[tuple[str, Future[Reply]]] = deque()
+        self._waiting: deque[tuple[Callable[[], bool], Future[Reply]]] = deque()
         self._running: Future[Reply] | None = None
         self._ended = False
 
@@ -24,9 +25,9 @@ class Typed:
         """Whether a text waits or moves."""
         return bool(self._waiting) or self._running is not None
 
-    def add(self, text: str, answer: "Future[Reply]") -> None:
-        """A text for later."""
-        self._waiting.append((text, answer))
+    def add(self, begin: Callable[[], bool], answer: "Future[Reply]") -> None:
+        """Something for later: ``begin`` proves it and says whether anything moves, or raises."""
+        self._waiting.append((begin, answer))
 
     def end(self) -> None:
         """Come to rest on the path, and forget what waits."""
@@ -51,13 +52,13 @@ class Typed:
         while self._waiting and self._running is None:
             self._begin(*self._waiting.popleft(), state)
 
-    def _begin(self, text: str, answer: "Future[Reply]", state: JobState) -> None:
+    def _begin(self, begin: Callable[[], bool], answer: "Future[Reply]", state: JobState) -> None:
         if state not in QUIET or self._player.busy:
             problem = Problem("state", f"no typed moves while the printer is {state.value}")
             answer.set_result(Reply(False, (f"error: {problem.message}",), (problem,)))
             return
         try:
-            if self._player.typed(text if text.endswith("\n") else f"{text}\n"):
+            if begin():
                 self._running, self._ended = answer, False
             else:
                 answer.set_result(self._reply())
@@ -82,4 +83,4 @@ def refused(error: CdhrError) -> Reply:
         lines.append(f"error: {problem.message}")
         if problem.hint:
             lines.append(f"hint: {problem.hint}")
-    return Reply(False, tuple(lines), error.problems)
+    return Reply(False, tuple(lines), error.problems, error.exit_code)
