@@ -5,7 +5,6 @@ Reading a line proves what can be proven of it alone: words, places, forces at r
 way. What is planned is looked at tick by tick before it is fed, well ahead of the machine.
 """
 
-import math
 import threading
 from collections import deque
 from collections.abc import Callable
@@ -31,8 +30,6 @@ SHORT: Final = 0.1
 """s a line lasts that counts as short"""
 PATIENCE: Final = 0.1
 """s of real time without a line after which the plan is brought to rest"""
-MARGIN: Final = 4
-"""ticks of the plan that are not fed while more may come"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,12 +132,6 @@ class LineStream:
             return False
         self._seen = end
         return True
-
-    def most(self, u: float) -> int | None:
-        """Ticks that may be fed from a time of the plan on without bringing it to rest; None for all."""
-        if self.course.rests or self.course.stop() is not None:
-            return None
-        return max(math.floor(self.course.staircase.tick - u) - MARGIN, 0)
 
     def executed(self, line: int, *, at_rest: bool) -> None:
         """A line is being executed; ``at_rest`` when all that is planned was."""

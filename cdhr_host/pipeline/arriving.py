@@ -5,13 +5,18 @@ more; only when playback needs it, the leg is closed: then the plan stands after
 command, and goes on from there when more have come.
 """
 
+import math
 from collections.abc import Iterator, Sequence
+from typing import Final
 
-from cdhr_host.pipeline.course import Course, Stop
+from cdhr_host.pipeline.course import UNBOUNDED, Course, Stop
 from cdhr_host.pipeline.staircase import Staircase
 from cdhr_host.pipeline.tape import Tape
 from cdhr_host.values import Blend, Command, Notice, Pause
 from cdhr_host.values import Stop as ExactStop
+
+MARGIN: Final = 4
+"""ticks of the plan kept back while more may come"""
 
 
 class ArrivingTape(Tape):
@@ -19,6 +24,12 @@ class ArrivingTape(Tape):
 
     def __init__(self) -> None:
         super().__init__(iter(()))
+
+    def room(self, u: float) -> int:
+        """Ticks that are planned beyond a time of the plan; unbounded up to rest, and when ``hurried``."""
+        if self.hurried or self.rests or self.stop() is not None:
+            return UNBOUNDED
+        return max(math.floor(self.staircase.tick - u) - MARGIN, 0)
 
     def add(self, commands: Sequence[Command]) -> None:
         """Further commands."""
@@ -33,6 +44,8 @@ class Arriving(Course):
         super().__init__(staircase, self._arrived)
         self._rests = True
         self._opened = False
+        self.hurried = False
+        """whether playback cannot wait for more commands"""
 
     @property
     def rests(self) -> bool:

@@ -8,6 +8,7 @@ planned anew with another feed.
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
+from typing import Final
 
 import numpy as np
 
@@ -18,6 +19,10 @@ from cdhr_host.pipeline.shift import Shift, nozzle_standing_at
 from cdhr_host.pipeline.staircase import Checked, Staircase
 from cdhr_host.pipeline.tape import Tape
 from cdhr_host.values import Array, Command, Ints, Pause, Setpoints, ToolTrack
+
+
+UNBOUNDED: Final = 1 << 40
+"""ticks: more than any text has"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,6 +161,10 @@ class Course:
             self._marks.popleft()
         while self._blocks and int(self._blocks[0].tick[-1]) < before:
             self._blocks.popleft()
+
+    def room(self, u: float) -> int:  # noqa: ARG002 - a whole text is planned whenever asked for
+        """Ticks that may be played on from a time of the plan without bringing it to rest for that."""
+        return UNBOUNDED
 
     def passed(self) -> None:
         """Go on beyond the stop that comes next."""
