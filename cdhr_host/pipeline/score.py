@@ -53,12 +53,29 @@ class Gain:
 
 
 @dataclass(frozen=True, slots=True)
+class Prime:
+    """Clay pushed while the nozzle stands, before a print goes on."""
+
+    begin: int = 0
+    """tick"""
+    end: int = 0
+    """the first tick after it"""
+    flow: float = 0.0
+    """m³/s"""
+
+    def at(self, tick: Ints) -> Array:
+        """(N,) ticks -> (N,) m³/s."""
+        return np.where((tick >= self.begin) & (tick < self.end), self.flow, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
 class Score:
     """What the machine plays; ``parts`` in order."""
 
     staircase: Staircase
     parts: tuple[Part, ...]
     gain: Gain = Gain()
+    prime: Prime = Prime()
 
     @property
     def last(self) -> Part:
@@ -152,11 +169,13 @@ class Score:
         return ToolTrack.joined(tracks)
 
     def _pushed(self, track: ToolTrack) -> ToolTrack:
-        """With the operator's share of the flow."""
-        gain = self.gain.at(track.tick)
-        if np.all(gain == 1.0):
+        """With the operator's share of the flow, and what is primed."""
+        gain, prime = self.gain.at(track.tick), self.prime.at(track.tick)
+        if np.all(gain == 1.0) and not prime.any():
             return track
-        return held_air(replace(track, flow=gain * track.flow), gain, self.staircase.profile.extruder)
+        return held_air(
+            replace(track, flow=gain * (track.flow + prime)), gain, self.staircase.profile.extruder
+        )
 
 
 def held_air(track: ToolTrack, share: Array, extruder: Extruder) -> ToolTrack:
