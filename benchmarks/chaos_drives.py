@@ -165,8 +165,9 @@ class Outcome:
 class Trial:
     """One print that is spoilt."""
 
-    def __init__(self, bus, victim, how, moment, pause, folder):
-        self.bus, self.victim, self.how, self.moment, self.pause = bus, victim, how, moment, pause
+    def __init__(self, bus, victim, how, timing, folder):
+        self.bus, self.victim, self.how = bus, victim, how
+        self.moment, self.pause = timing
         self.trace = Path(folder) / "trace.csv"
         command = [sys.executable, "-m", "cdhr_host", "sim", "--bus", bus, "--trace", str(self.trace)]
         self.far = subprocess.Popen(command, cwd=REPOSITORY, stdout=subprocess.PIPE, text=True)
@@ -298,7 +299,7 @@ def _lives(pid):
 def one(bus, victim, how, moment, pause):
     """The outcome of one trial."""
     with tempfile.TemporaryDirectory() as folder:
-        return Trial(bus, victim, how, moment, pause, folder).run()
+        return Trial(bus, victim, how, (moment, pause), folder).run()
 
 
 def main():
