@@ -20,7 +20,6 @@ from cdhr_host.pipeline.staircase import Checked, Staircase
 from cdhr_host.pipeline.tape import Tape
 from cdhr_host.values import Array, Command, Ints, Pause, Setpoints, ToolTrack
 
-
 UNBOUNDED: Final = 1 << 40
 """ticks: more than any text has"""
 
