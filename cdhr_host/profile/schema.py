@@ -166,9 +166,33 @@ class Job(Section):
     ] = "clean"
 
 
+class Bead(Section):
+    """[bead]: what is laid where a program says where, but not how much."""
+
+    width: Annotated[float, key("width_mm", "width of the bead", gt=0, le=200), IN_MM] = 5.0 * MM
+    layer_height: Annotated[float, key("layer_height_mm", "height of a layer", gt=0, le=200), IN_MM] = (
+        2.5 * MM
+    )
+    first_layer: Annotated[
+        float,
+        key("first_layer_percent", "clay on the first layer, of what is written or laid", gt=0, le=300),
+        to_si(0.01),
+    ] = 1.0
+
+
 class Air(Section):
     """[air]: which words open and close the air besides E; each is ``ignore`` or ``air``."""
 
+    lays: Annotated[
+        Literal["pressure", "bead"],
+        Field(description="what open air does: hold a pressure along the moves, or lay the bead of [bead]"),
+    ] = "pressure"
+    comments: Annotated[
+        Literal["ignore", "type", "path"],
+        Field(
+            description="comments that lay a bead on G1 to G5 without E: ;TYPE: features, or ;Start path to ;End path"
+        ),
+    ] = "ignore"
     fan_words: Annotated[Literal["ignore", "air"], Field(description="M106 S0-255 / M107")]
     spindle_words: Annotated[Literal["ignore", "air"], Field(description="M3 S0-255 / M5")]
     valve_words: Annotated[Literal["ignore", "air"], Field(description="M126 / M127")]
@@ -297,6 +321,7 @@ class Profile(Section):
     path: PathRules
     bed: Bed
     extruder: Extruder
+    bead: Bead = Bead()
     clay: Clay = Clay()
     job: Job = Job()
     air: Air

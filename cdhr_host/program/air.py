@@ -32,9 +32,12 @@ def output(run: Run, block: Block) -> None:
     if _rule(run.profile, block.code) == "ignore" or not _addressed(run, block):
         return
     closes = block.code in ("M107", "M5", "M127", "M381")
-    pressure = 0.0 if closes else level / FULL * run.profile.extruder.pressure_max
+    share = 0.0 if closes else level / FULL
     run.flush()
-    run.modal = replace(run.modal, air=pressure)
+    if run.profile.air.lays == "bead":
+        run.modal = replace(run.modal, open=share)
+    else:
+        run.modal = replace(run.modal, air=share * run.profile.extruder.pressure_max)
 
 
 def _addressed(run: Run, block: Block) -> bool:

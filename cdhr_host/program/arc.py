@@ -17,7 +17,7 @@ from cdhr_host.program.block import Block
 from cdhr_host.program.modal import GRID_DIGITS, Modal, Point, Point2
 from cdhr_host.program.run import Run, missing_feed
 from cdhr_host.program.settings import PLANES
-from cdhr_host.program.straight import LONGEST, reach, row_of
+from cdhr_host.program.straight import LONGEST, laid, reach, row_of
 from cdhr_host.units import MM
 from cdhr_host.values import Arc, Plane
 
@@ -62,7 +62,11 @@ def arc(run: Run, block: Block) -> None:
             run.refuse(_problem(block, refused))
         run.modal = steps.modal
         return
-    clay, air = float(steps.clay[0]), run.modal.air
+    radius = sum(math.dist(at, centre) for at in (start2, end2)) / 2
+    axis = plane.value[2]
+    way = math.hypot(radius * sweep, end[axis] - before[axis])
+    clay = laid(run.modal, float(steps.clay[0]), "E" in block, way, (before[2], end[2]))
+    air = run.modal.air
     run.modal = steps.modal
     made = Arc(block.line, np.array(before), np.array(end), np.array(centre), sweep, speed, clay, air, plane)
     if clay > 0.0 or air > 0.0:

@@ -11,6 +11,9 @@ from cdhr_host.values import Notice
 
 _LAYER_MARKS: Final = frozenset({"LAYER", "LAYER_CHANGE"})
 _TEXTS: Final = {"TYPE": "feature", "FLAVOR": "flavour"}
+_NO_FEATURES: Final = frozenset({"travel", "custom", "wipe", "none"})
+"""features of ;TYPE: that lay nothing"""
+_PATHS: Final = {"start path": True, "end path": False}
 _LENGTHS: Final = {"WIDTH": "width", "HEIGHT": "height", "Z": "z"}
 
 
@@ -18,6 +21,7 @@ def comment(run: Run, text: str, line: int) -> None:
     """A line that is a comment; ``text`` follows its semicolon."""
     name, _, value = text.partition(":")
     name, value = name.strip(" \t"), value.strip(" \t")
+    _mark(run, name, value)
     if name in _LAYER_MARKS:
         _layer(run, name, line)
     elif name in _TEXTS:
@@ -28,6 +32,20 @@ def comment(run: Run, text: str, line: int) -> None:
             _note(run, **{_LENGTHS[name]: length * MM})
     elif name == "LAYER_COUNT" and value.isdecimal():
         _note(run, layers=int(value))
+
+
+def _mark(run: Run, name: str, value: str) -> None:
+    """What a comment says about laying the bead, where the profile listens to comments."""
+    rule = run.profile.air.comments
+    if rule == "type" and name == "TYPE":
+        marked = value.casefold() not in _NO_FEATURES
+    elif rule == "path" and name.casefold() in _PATHS:
+        marked = _PATHS[name.casefold()]
+    else:
+        return
+    if marked != run.modal.marked:
+        run.flush()
+        run.modal = replace(run.modal, marked=marked)
 
 
 def _layer(run: Run, mark: str, line: int) -> None:

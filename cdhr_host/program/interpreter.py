@@ -8,7 +8,7 @@ from typing import Final
 from cdhr_host.errors import Problem, ProgramError
 from cdhr_host.profile.schema import Profile
 from cdhr_host.program.comments import comment
-from cdhr_host.program.modal import Metadata, Modal
+from cdhr_host.program.modal import Laying, Metadata, Modal
 from cdhr_host.program.parse import parse_line
 from cdhr_host.program.run import Run
 from cdhr_host.program.straight import Row
@@ -40,6 +40,7 @@ class Interpreter:
             (x, y, z),
             volumetric=extruder.e_unit == "mm3",
             filament_diameter=extruder.filament_diameter,
+            laying=Laying.of(profile.bead),
         )
 
     @property

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Final
 
+from cdhr_host.profile.schema import Bead
 from cdhr_host.units import MM, MM3
 from cdhr_host.values import Plane
 
@@ -34,6 +35,30 @@ class Metadata:
     """m, of the layer (``;HEIGHT:``)"""
     z: float | None = None
     """m, of the layer (``;Z:``)"""
+
+
+@dataclass(frozen=True, slots=True)
+class Laying:
+    """What is laid where a program does not say how much, and more or less on the first layer."""
+
+    area: float = 0.0
+    """m² of the bead's cross-section: a rectangle with half circles at its sides"""
+    first_height: float = 0.0
+    """m: moves that stay up to this height are of the first layer"""
+    first_factor: float = 1.0
+    """of the clay, on the first layer"""
+
+    @classmethod
+    def of(cls, bead: Bead) -> "Laying":
+        """The bead of a profile; where it is higher than wide, an ellipse of the same sides."""
+        width, height = bead.width, bead.layer_height
+        rounded = (width - height) * height + math.pi / 4 * height**2
+        area = rounded if width >= height else math.pi / 4 * width * height
+        return cls(area, 1.5 * height, bead.first_layer)
+
+    def share(self, low: float, high: float) -> float:
+        """Factor of the clay of a move between two heights, m."""
+        return self.first_factor if max(low, high) <= self.first_height else 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +95,11 @@ class Modal:
     """m³ taken back by negative E and not yet given again"""
     air: float = 0.0
     """Pa held by air words"""
+    laying: Laying = Laying()
+    open: float = 0.0
+    """share of the bead that air words lay, on every move without E"""
+    marked: bool = False
+    """whether comments say that G1 to G5 without E lay the bead"""
     top: float = -math.inf
     """m, the highest the nozzle was while it laid clay"""
     near: float = math.inf
@@ -95,6 +125,11 @@ class Modal:
     def clay_per_e(self) -> float:
         """m³ of clay in 1 mm of filament, or in 1 mm³."""
         return MM3 if self.volumetric else MM * math.pi / 4 * self.filament_diameter**2
+
+    def bead(self, *, travels: bool) -> float:
+        """m³/m that a move without E lays; ``travels`` for G0."""
+        share = self.open or float(self.marked and not travels)
+        return share * self.laying.area * self.flow_factor
 
     def flow(self, feed: float) -> float:
         """m³/s of an E that is alone in its line, with F as its rate."""

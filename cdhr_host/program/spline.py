@@ -18,7 +18,7 @@ from cdhr_host.errors import Problem
 from cdhr_host.program.block import Block
 from cdhr_host.program.modal import Modal, Point, Point2
 from cdhr_host.program.run import Run, missing_feed
-from cdhr_host.program.straight import LONGEST, reach, row_of
+from cdhr_host.program.straight import LONGEST, laid, reach, row_of
 from cdhr_host.values import Array, Plane, Prime, Spline
 
 PARTS: Final = 256
@@ -64,7 +64,9 @@ def _curve(run: Run, block: Block, control_of: Callable[[Block, Modal, Point], A
         if not (refused.follows and run.lost):
             run.refuse(_problem(block, refused))
         return
-    made = Spline(block.line, control, speed, float(steps.clay[0]), before.air)
+    z = before.position[2]
+    clay = laid(before, float(steps.clay[0]), "E" in block, _length(control), (z, z))
+    made = Spline(block.line, control, speed, clay, before.air)
     if (control != control[0]).any():
         _draw(run, made)
     elif made.clay > 0.0:
@@ -127,17 +129,29 @@ def _between(start: Point, entering: Point2, leaving: Point2, end: Point) -> Arr
     return np.array([start, first, second, end])
 
 
+def _length(control: Array) -> float:
+    """m, of PARTS chords."""
+    return float(np.linalg.norm(np.diff(_points(control), axis=0), axis=1).sum())
+
+
+def _points(control: Array) -> Array:
+    """(PARTS + 1, 3) m, evenly by the parameter."""
+    t = np.arange(PARTS + 1)[:, None] / PARTS
+    u = 1.0 - t
+    points: Array = (
+        u**3 * control[0] + 3 * u**2 * t * control[1] + 3 * u * t**2 * control[2] + t**3 * control[3]
+    )
+    return points
+
+
 def _reach(control: Array) -> tuple[float, float]:
     """m: the top of a curve, and a distance to the reference axis that it keeps.
 
     A chord over 1/n of the parameter is off by |B''| / (8 n²) at most, and |B''| is greatest
     at an end.
     """
-    t = np.arange(PARTS + 1)[:, None] / PARTS
-    u = 1.0 - t
-    points = u**3 * control[0] + 3 * u**2 * t * control[1] + 3 * u * t**2 * control[2] + t**3 * control[3]
     bend = 6 * np.hypot(*np.diff(control, 2, axis=0)[:, :2].T).max()
-    return reach(points, 0.0, float(bend) / (8 * PARTS**2))
+    return reach(_points(control), 0.0, float(bend) / (8 * PARTS**2))
 
 
 def _problem(block: Block, refused: _NoCurveError) -> Problem:

@@ -89,7 +89,7 @@ def interpret(
     A row that moves becomes a row of ``Moves``; one that stands still and lays clay a
     ``Prime``; one that does neither vanishes. Speed is ``speed_max`` (m/s) before the first F.
     """
-    steps = resolve(modal, rows)
+    steps = _laying(modal, resolve(modal, rows), rows)
     speed = np.where(np.isnan(steps.feed), speed_max, steps.feed * modal.speed_factor)
     moved = (steps.points[1:] != steps.points[:-1]).any(axis=1)
     still = np.flatnonzero(~moved & (steps.clay > 0.0))
@@ -106,6 +106,24 @@ def interpret(
             commands.append(Prime(int(line[at]), float(steps.clay[at]), flow))
         first = at + 1
     return _printed(steps, modal.air), commands
+
+
+def _laying(modal: Modal, steps: Steps, rows: Sequence[Row]) -> Steps:
+    """With the bead where a row has no E, and the first layer's share."""
+    points, clay = steps.points, steps.clay
+    if modal.open or modal.marked:
+        bead = np.array([0.0 if row[6] else modal.bead(travels=row[0] == "0") for row in rows])
+        clay = clay + bead * np.linalg.norm(np.diff(points, axis=0), axis=1)
+    if modal.laying.first_factor != 1.0:
+        high = np.maximum(points[:-1, 2], points[1:, 2])
+        clay = np.where(high <= modal.laying.first_height, modal.laying.first_factor, 1.0) * clay
+    return steps if clay is steps.clay else replace(steps, clay=clay)
+
+
+def laid(modal: Modal, clay: float, has_e: bool, length: float, heights: tuple[float, float]) -> float:
+    """m³ of an arc or a curve: what its E says, or the bead along its length (m)."""
+    bead = 0.0 if has_e else modal.bead(travels=False) * length
+    return modal.laying.share(*heights) * (clay + bead)
 
 
 def _moves(
