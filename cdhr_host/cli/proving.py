@@ -38,7 +38,7 @@ def proven(
     """
     from cdhr_host.pipeline import prove
 
-    with _log(log, machine, rate) as (out, takes), Progress("checking") as progress:
+    with _log(log, machine, rate, source.name) as (out, takes), Progress("checking") as progress:
 
         def watch(checked: "Checked") -> None:
             if see is not None:
@@ -54,21 +54,22 @@ def proven(
 
 @contextmanager
 def _log(
-    wish: LogWish | None, machine: "Profile", rate: float | None
+    wish: LogWish | None, machine: "Profile", rate: float | None, program: str
 ) -> "Iterator[tuple[Log | None, dict[str, Any]]]":
     """The log, if there is to be one, and what of the proof it takes."""
     if wish is None:
         yield None, {}
         return
     from cdhr_host.report.compact import CompactLog
-    from cdhr_host.report.log import SetpointLog
+    from cdhr_host.report.log import SetpointLog, about
 
+    known = about(machine, program)
     with writing(wish.path):
         if wish.compact:
-            with CompactLog(wish.path, machine.drives.period if rate is None else 1.0 / rate) as small:
+            with CompactLog(wish.path, machine.drives.period if rate is None else 1.0 / rate, known) as small:
                 yield small, {"trace": small.add_trace}
         else:
-            with SetpointLog(wish.path) as full:
+            with SetpointLog(wish.path, known) as full:
                 yield full, {"sink": full.add_setpoints}
 
 

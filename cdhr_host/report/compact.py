@@ -4,7 +4,9 @@ Lengths are whole tenths of a micrometre, as drives take them; pressure is in pa
 are consecutive ticks from 0 on; the schema's metadata give the period.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import BinaryIO
 
 import numpy as np
@@ -53,10 +55,9 @@ WRITERS = {".parquet": _Packed}
 class CompactLog(Log):
     """Sliders, nozzle and pressure of a dry run, one row a tick."""
 
-    def __init__(self, path: Path, period: float) -> None:
-        schema = pa.schema(
-            [(name, pa.int32()) for name in COMPACT_COLUMNS], metadata={"period_s": repr(period)}
-        )
+    def __init__(self, path: Path, period: float, metadata: Mapping[str, str] = MappingProxyType({})) -> None:
+        known = {**metadata, "period_s": repr(period)}
+        schema = pa.schema([(name, pa.int32()) for name in COMPACT_COLUMNS], metadata=known)
         super().__init__(path, schema, WRITERS)
 
     def add_trace(self, trace: Trace) -> None:

@@ -1,15 +1,17 @@
 """Logs on disk: CSV or Parquet by suffix, written as the rows come, visible only when complete."""
 
+import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 from typing import BinaryIO, Protocol, Self
 
 import pyarrow as pa
 import pyarrow.csv as pa_csv
 import pyarrow.parquet as pq
 
+from cdhr_host import __version__
 from cdhr_host.pipeline.columns import (
     FEEDBACK_COLUMNS,
     SETPOINT_COLUMNS,
@@ -17,6 +19,7 @@ from cdhr_host.pipeline.columns import (
     run_columns,
     setpoint_columns,
 )
+from cdhr_host.profile import Profile, described
 from cdhr_host.report.files import check_place
 from cdhr_host.values import Feedback, Setpoints
 
@@ -24,9 +27,16 @@ ROW_GROUP = 50_000
 """Rows held before they are written: 200 s at 250 Hz, some 10 MB."""
 
 
-def _schema(names: Sequence[str]) -> pa.Schema:
+def about(profile: Profile, program: str) -> dict[str, str]:
+    """What a Parquet log says of itself besides its rows: program, version and the profile in full."""
+    values = {f"{section}.{key}": value for section, key, value, _ in described(profile)}
+    return {"program": program, "version": __version__, "profile": json.dumps(values)}
+
+
+def _schema(names: Sequence[str], metadata: Mapping[str, str]) -> pa.Schema:
     whole = {name for name in names if name == "line" or name.endswith("_counts")}
-    return pa.schema([(name, pa.int64() if name in whole else pa.float64()) for name in names])
+    fields = [(name, pa.int64() if name in whole else pa.float64()) for name in names]
+    return pa.schema(fields, metadata=dict(metadata))
 
 
 class Writer(Protocol):
@@ -130,10 +140,10 @@ class Log:
 
 
 class SetpointLog(Log):
-    """The setpoints of a dry run, one row a tick."""
+    """The setpoints of a dry run, one row a tick; ``metadata`` as of ``about``, which CSV cannot hold."""
 
-    def __init__(self, path: Path) -> None:
-        super().__init__(path, _schema(SETPOINT_COLUMNS))
+    def __init__(self, path: Path, metadata: Mapping[str, str] = MappingProxyType({})) -> None:
+        super().__init__(path, _schema(SETPOINT_COLUMNS, metadata))
 
     def add_setpoints(self, setpoints: Setpoints) -> None:
         """Append N ticks."""
@@ -143,8 +153,8 @@ class SetpointLog(Log):
 class RunLog(Log):
     """What was sent and what came back, one row an executed tick."""
 
-    def __init__(self, path: Path) -> None:
-        super().__init__(path, _schema(SETPOINT_COLUMNS + FEEDBACK_COLUMNS))
+    def __init__(self, path: Path, metadata: Mapping[str, str] = MappingProxyType({})) -> None:
+        super().__init__(path, _schema(SETPOINT_COLUMNS + FEEDBACK_COLUMNS, metadata))
 
     def add_run(self, setpoints: Setpoints, feedback: Feedback) -> None:
         """Append N executed ticks."""
