@@ -11,6 +11,7 @@ from cdhr_host.cli import (
     dry_run,
     generate,
     jog,
+    plot,
     profiles,
     reproduce,
     serve,
@@ -47,6 +48,7 @@ app.add_typer(profiles.app, name="profile")
 app.add_typer(drives.app, name="drives")
 app.command("compensation", epilog=compensation.EXAMPLES)(compensation.compensation)
 app.command("reproduce", epilog=reproduce.EXAMPLES)(reproduce.reproduce)
+app.command("plot", epilog=plot.EXAMPLES)(plot.plot)
 app.command("workspace", epilog=workspace.EXAMPLES)(workspace.workspace)
 app.add_typer(generate.app, name="generate")
 
