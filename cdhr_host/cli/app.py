@@ -6,6 +6,7 @@ import typer
 
 from cdhr_host import __version__
 from cdhr_host.cli import (
+    calibrate,
     compensation,
     drives,
     dry_run,
@@ -51,6 +52,7 @@ app.command("reproduce", epilog=reproduce.EXAMPLES)(reproduce.reproduce)
 app.command("plot", epilog=plot.EXAMPLES)(plot.plot)
 app.command("workspace", epilog=workspace.EXAMPLES)(workspace.workspace)
 app.add_typer(generate.app, name="generate")
+app.add_typer(calibrate.app, name="calibrate")
 
 
 def _version(asked: bool) -> None:

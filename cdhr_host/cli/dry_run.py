@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cdhr_host.cli.machine import check_log, open_machine
-from cdhr_host.cli.options import Json, LogPath, ProfileName, examples
+from cdhr_host.cli.options import Json, LogPath, MaterialName, ProfileName, examples
 from cdhr_host.cli.proving import LogWish, proven, tell_problems
 from cdhr_host.cli.refusals import Refusal, about, check_file, emit, writing
 from cdhr_host.cli.source import Source
@@ -34,6 +34,7 @@ def dry_run(
     ],
     *,
     profile: ProfileName = "paper",
+    material: MaterialName = None,
     log: LogPath = None,
     rate: Annotated[
         float | None,
@@ -54,7 +55,7 @@ def dry_run(
     from cdhr_host.report.summary import proof_record, refused_record, summary_lines
 
     source = Source(file)
-    machine = open_machine(profile)
+    machine = open_machine(profile, material)
     check_log(log, compact=compact)
     page = _Page(report, machine, (source.name, profile))
     written = {} if report is None else {"report": str(report)}

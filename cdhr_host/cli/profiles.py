@@ -1,6 +1,7 @@
 """``cdhr profile``: which machines are known, what they are, whether a file is one."""
 
 import json
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -10,6 +11,9 @@ from cdhr_host.cli.refusals import Refusal, about, emit
 
 if TYPE_CHECKING:
     from cdhr_host.profile import MaterialFile, Profile
+
+Sections = dict[str, list[tuple[str, Any, str]]]
+"""section -> its keys with their values and descriptions"""
 
 app = typer.Typer(
     help="List, show and check machine and material profiles.",
@@ -53,16 +57,12 @@ def list_(json_: Json = False) -> None:
 def show(name: Name = "paper", material: MaterialName = None, json_: Json = False) -> None:
     """Every value of a profile with its unit: a valid profile in itself."""
     with about(name):
-        sections = _sections(_opened(name, material))
+        sections = _grouped(_opened(name, material))
     if json_:
         emit(json.dumps({part: {key: value for key, value, _ in rows} for part, rows in sections.items()}))
         return
-    for part, rows in sections.items():
-        emit(f"[{part}]")
-        for key, value, text in rows:
-            assignment = f"{key} = {_toml(value)}"
-            emit(f"{assignment:<42} # {text}" if text else assignment)
-        emit("")
+    for line in _written(sections):
+        emit(line)
 
 
 @app.command(epilog=examples("cdhr profile check mine.toml", "cdhr profile check"))
@@ -86,6 +86,20 @@ def check(
             refusals.append(str(refusal))
     if refusals:
         raise Refusal("\n".join(refusals), ProfileError.exit_code)
+
+
+def toml_lines(profile: "Profile | MaterialFile") -> Iterator[str]:
+    """A profile as the lines of its file."""
+    return _written(_grouped(profile))
+
+
+def _written(sections: "Sections") -> Iterator[str]:
+    for part, rows in sections.items():
+        yield f"[{part}]"
+        for key, value, text in rows:
+            assignment = f"{key} = {_toml(value)}"
+            yield f"{assignment:<42} # {text}" if text else assignment
+        yield ""
 
 
 def _toml(value: Any) -> str:
@@ -115,11 +129,11 @@ def _verdict(profile: "Profile | MaterialFile") -> str:
     return f"{profile.machine.name}; CAN bus {bus_share(profile):.0%} full at worst"
 
 
-def _sections(profile: "Profile | MaterialFile") -> dict[str, list[tuple[str, Any, str]]]:
+def _grouped(profile: "Profile | MaterialFile") -> "Sections":
     """Section -> (key with unit, value in that unit, description)."""
     from cdhr_host.profile import described
 
-    found: dict[str, list[tuple[str, Any, str]]] = {}
+    found: Sections = {}
     for section, key, value, text in described(profile):
         found.setdefault(section, []).append((key, value, text))
     return found
