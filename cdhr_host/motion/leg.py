@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdhr_host.errors import MotionError, Problem
+from cdhr_host.motion.flow import FlowLimits
 from cdhr_host.motion.limits import Cells, MotionLimits, cells
 from cdhr_host.motion.look_ahead import border_speeds
 from cdhr_host.motion.smooth_path import STRAIGHT, SmoothPath, norms, reaches, smooth
@@ -32,8 +33,8 @@ class FeedOverride:
 
     factor: float = 1.0
     """of every programmed speed, at least 1; slower is played, not planned (``motion.playback``)"""
-    flow_max: float = math.inf
-    """m³/s, what the air can push: no faster than that where clay is laid"""
+    flow: float = 1.0
+    """of the programmed flow, for what the air can push"""
 
 
 AS_PROGRAMMED = FeedOverride()
@@ -57,13 +58,11 @@ class Segments:
     def __len__(self) -> int:
         return len(self.line)
 
-    def wanted(self, override: "FeedOverride") -> Array:
+    def wanted(self, override: "FeedOverride", flow: FlowLimits) -> Array:
         """(M,) m/s: the programmed speed, faster where the operator wants it and the air can follow."""
-        if override.factor == 1.0:
+        if override == AS_PROGRAMMED:
             return self.feed
-        with np.errstate(divide="ignore"):
-            pushed = np.where(self.clay > 0.0, override.flow_max / self.clay, np.inf)
-        return np.minimum(self.feed * override.factor, np.maximum(pushed, self.feed))
+        return flow.feed(self.feed * override.factor, self.clay * override.flow)
 
     def part(self, first: int, last: int) -> "Segments":
         """Segments first to last - 1."""
@@ -173,7 +172,8 @@ class LegPlanner:
 
     def _paces(self, segments: Segments) -> tuple[Array, Array]:
         """(M,) m/s wanted, (M,) share of acceleration and jerk that the air leaves for changing it."""
-        limits, feed = self._limits, segments.wanted(self._override)
+        limits = self._limits
+        feed = segments.wanted(self._override, limits.flow)
         return feed, limits.flow.share(feed, segments.clay, limits.acceleration)
 
     def _start(self, segments: Segments) -> None:
