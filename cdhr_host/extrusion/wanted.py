@@ -17,6 +17,8 @@ from cdhr_host.values import Array, Flags, Ints
 
 RISING: Final = 4
 """power of time by which the pressure nears creeping, so that it goes on rising as steeply with the bead"""
+SLOW: Final = 0.02
+"""of the flow that is about to be laid: creeping is slower than that"""
 NEVER: Final = 2**40
 """ticks: further than any program is long"""
 
@@ -48,7 +50,7 @@ class Wanted:
 def wanted(flow: Array, since: int, law: PressureFlow, creep: float, gaps: Gaps) -> Wanted:
     """(N,) m³/s, all that is known, and ticks ``since`` the row before these flowed last.
 
-    ``creep`` is the flow, m³/s, at which a bead may begin and end. Rows further than ``gaps.longest``
+    ``creep`` is the flow, m³/s, at which a bead may begin. Rows further than ``gaps.longest``
     from the end do not depend on what may follow.
     """
     flowing = flow > 0.0
@@ -56,9 +58,10 @@ def wanted(flow: Array, since: int, law: PressureFlow, creep: float, gaps: Gaps)
     short = ago + ahead - 1 <= gaps.longest
     near = ahead <= gaps.restore
     ramp = np.where(short, 1.0, _eased(ahead, gaps.restore))
-    more = float(law.pressure(np.array(creep))) - law.threshold
+    slow = np.minimum(creep, SLOW * _peak(flow, 2 * gaps.creeps))
+    more = law.pressure(slow) - law.threshold if creep > 0.0 else 0.0
     pressure = law.threshold * ramp + more * _nearing(ahead, gaps.creeps) ** RISING
-    pressure[flowing] = law.pressure(np.maximum(flow[flowing], creep))
+    pressure[flowing] = law.pressure(np.maximum(flow[flowing], slow[flowing]))
     opened = flowing | near | short
     return Wanted(np.where(opened, pressure, 0.0), opened, ago)
 
@@ -72,6 +75,12 @@ def _eased(ahead: Ints, length: int) -> Array:
 def _nearing(ahead: Ints, length: int) -> Array:
     """(N,) ticks before a bead -> from 0, ``length`` ticks before it, to 1."""
     return np.asarray(np.clip(1.0 - ahead / max(length, 1), 0.0, 1.0))
+
+
+def _peak(flow: Array, ahead: int) -> Array:
+    """(N,) the greatest of each row and of ``ahead`` rows after it."""
+    padded = np.concatenate((flow, np.zeros(ahead)))
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(padded, ahead + 1).max(axis=1))
 
 
 def _since(flowing: Flags, before: int) -> Ints:
