@@ -116,8 +116,9 @@ def choices(
     """Paces from tick ``first`` on that keep the limits, soonest settled first."""
     period, profile = ahead.profile.drives.period, ahead.profile
     least = bound(profile, *ahead.speeds, max(change, 1e-3)) / period
+    soonest = RATE_SLOPE * change * ahead.pushing / period
     begins = sorted({round(share * turning_time(profile) / period) for share in waits})
-    lasting = sorted({max(SHORTEST, math.ceil(stretch * least)) for stretch in STRETCHES})
+    lasting = sorted({max(SHORTEST, math.ceil(max(stretch * least, soonest))) for stretch in STRETCHES})
     pairs = sorted(((wait, last) for wait in begins for last in lasting), key=lambda pair: (sum(pair), pair))
     for wait, last in pairs:
         pace = make(wait, last)
