@@ -122,7 +122,8 @@ class Desk(App[None]):
 
     def say(self, text: str) -> None:
         """Add to the messages."""
-        self.screen_stack[0].query_one(RichLog).write(text)
+        for log in self.screen_stack[0].query(RichLog):  # gone at the very end
+            log.write(text)
 
     def run_code(self, text: str) -> None:
         """Prove and run G-code; the answer becomes a message."""
@@ -258,4 +259,5 @@ class Desk(App[None]):
             "air": f"{panels.air(status)}  {self._jogging.label}",
         }
         for name, text in shown.items():
-            self.screen_stack[0].query_one(f"#{name}", Static).update(text)
+            for panel in self.screen_stack[0].query(f"#{name}").results(Static):  # gone at the very end
+                panel.update(text)
