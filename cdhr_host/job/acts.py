@@ -8,6 +8,8 @@ from cdhr_host.drives.clock import Clock
 from cdhr_host.drives.link import LinkState
 from cdhr_host.drives.rows import joined
 from cdhr_host.errors import CdhrError, JobError, Problem
+from cdhr_host.job.line_stream import LineStream
+from cdhr_host.job.lines import Lines
 from cdhr_host.job.player import Kind, Player, Rest
 from cdhr_host.job.program import Program
 from cdhr_host.job.reading import Count, Reader, Seen
@@ -36,18 +38,21 @@ class Acts:
         self._count: Count | None = None
         self._seen = Seen()
         self._over = False
+        self._lines = Lines(player, clock, telling, happened)
         player.observers.append(self._executed)
 
     @property
     def busy(self) -> bool:
         """Whether the machine moves or is to move."""
-        return self.player.busy or self.player.link.state is LinkState.STOPPING
+        return self.player.busy or self._lines.idle or self.player.link.state is LinkState.STOPPING
 
     def status(self, state: JobState) -> Status:
         """As of the last turn."""
         player, count = self.player, self._count
         now = self._clock.now()
-        progress = count.progress(now, player.feed, over=state is JobState.DONE) if count else None
+        progress = (
+            count.progress(now, player.feed, over=state is JobState.DONE) if count else self._lines.progress()
+        )
         return self._reader.status(
             state,
             self.message,
@@ -97,22 +102,34 @@ class Acts:
         self._count = Count(self._program, self._clock.now())
         self.player.print(self._program)
 
+    def open(self, name: str) -> LineStream:
+        """Print what a client sends."""
+        self.forget()
+        return self._lines.open(name)
+
     def hold(self) -> None:
         """Come to rest on the path."""
-        self.player.hold()
+        if self._lines.idle:
+            self._happened(Word.RESTED, self.message)
+        else:
+            self.player.hold()
 
     def check_resume(self) -> None:
         """Raises JobError where a print cannot go on yet."""
         if self.player.kind not in {None, Kind.PROGRAM}:
             raise JobError(Problem("busy", "the machine still moves", hint="wait until it stands"))
+        self._lines.check_resume()
 
     def resume(self) -> None:
         """Back to speed on the path."""
-        self.player.go_on()
+        if not self._lines.resumed():
+            self.player.go_on()
 
     def abort(self) -> None:
         """Come to rest; the lift follows."""
-        if self.player.kind is Kind.PROGRAM:
+        if self._lines.idle:
+            self._lift()
+        elif self.player.kind is Kind.PROGRAM:
             self.player.hold()
 
     def emergency_stop(self) -> None:
@@ -136,6 +153,8 @@ class Acts:
     def override(self, feed: float | None, flow: float | None, state: JobState) -> None:
         """Other shares from now on."""
         self.player.override(feed, flow, moving=state in {JobState.PRINTING, JobState.RESUMING})
+        if feed is not None:
+            self._lines.hasten(feed)
         told = [
             f"{what} {share:.0%}" for what, share in (("feed", feed), ("flow", flow)) if share is not None
         ]
@@ -162,9 +181,11 @@ class Acts:
     def turn(self, state: JobState) -> None:
         """Feed, collect, and what follows from it."""
         if state is JobState.FAULT:
+            self._lines.end()
             with suppress(CdhrError):
                 self.player.collect()
             return
+        self._lines.turn(state)
         rest = self.player.turn()
         if self._count is not None:
             self._count.plan = self.player.plan_time(self._count.plan)
@@ -179,7 +200,13 @@ class Acts:
 
     def _rested(self, rest: Rest, state: JobState) -> None:
         """The program stands."""
-        if rest.stop is not None and rest.stop.pause is None:
+        if rest.stop is not None and rest.stop.waits and state in {JobState.PRINTING, JobState.RESUMING}:
+            self._lines.rested(rest.stop, state)
+        elif rest.stop is not None and rest.stop.waits and state is JobState.HOLDING:
+            self._happened(Word.RESTED, self.message)
+        elif rest.stop is not None and rest.stop.waits and state is not JobState.STOPPING:
+            return
+        elif rest.stop is not None and rest.stop.pause is None and not rest.stop.waits:
             self.player.over()
             if state is JobState.STOPPING:
                 self._happened(Word.LIFTED, "")
@@ -196,6 +223,7 @@ class Acts:
 
     def _lift(self) -> None:
         """After an abort: up and away from the clay, if that can be done."""
+        self._lines.end()
         self.player.over()
         height = self.player.lift(LIFTS)
         if not height:

@@ -62,7 +62,7 @@ class LineStream:
         self._machine = machine
         self._foresight = Foresight(machine)
         self._tell, self._now = tell, now
-        self._ahead = AHEAD * min(speed, 1000.0) / machine.period
+        self._ahead = AHEAD * speed / machine.period
         self._lock = threading.Lock()
         self._waiting: deque[Waiting] = deque()
         self._room = WAITING_MAX
@@ -76,7 +76,7 @@ class LineStream:
     def offer(self, line: str, *, typed: bool = False) -> bool:
         """Take one line of G-code; False while there is no room. From any thread."""
         with self._lock:
-            if len(self._waiting) >= self._room:
+            if self._finished or len(self._waiting) >= self._room:
                 return False
             self._waiting.append(Waiting(" ".join(line.split("\n")), typed))
             self._offered += 1
@@ -99,8 +99,8 @@ class LineStream:
 
     @property
     def drained(self) -> bool:
-        """Whether all lines are planned, up to rest."""
-        return not self._waiting and self.course.rests
+        """Whether all lines that can be read are planned, up to rest."""
+        return (not self._waiting or self.refusal is not None) and self.course.rests
 
     @property
     def patient(self) -> bool:
@@ -135,25 +135,36 @@ class LineStream:
 
     def executed(self, line: int, *, at_rest: bool) -> None:
         """A line is being executed; ``at_rest`` when all that is planned was."""
-        resting = at_rest and self.drained
+        resting = at_rest and self.drained and not self._waiting
         self._done = self._offered if resting else max(self._done, min(line - 1, self._offered))
 
     def go_on(self) -> None:
         """The operator lets a refused line be left out."""
         self.refusal = None
 
-    def progress(self, now: float, line: int, *, printing: float) -> Progress:
+    def close(self) -> None:
+        """It is over; what was not read is forgotten."""
+        self._finished = True
+        self._waiting.clear()
+        self._done = self._offered
+
+    def hasten(self, factor: float) -> None:
+        """Lines read from now on have this factor on their feed."""
+        self._machine.restore(replace(self._machine.modal, speed_factor=factor))
+
+    def progress(self, line: int) -> Progress:
         """As of a program whose end is not known."""
+        elapsed = self._now() - self.began
         return Progress(
             file=self.name,
             lines=self._offered,
             line=line,
             position=0,
             size=0,
-            layer=self._machine.modal.layer,
+            layer=0,
             layers=0,
-            elapsed=now,
-            printing=printing,
+            elapsed=elapsed,
+            printing=elapsed,
             left=0.0,
             duration=0.0,
             extruded=0.0,

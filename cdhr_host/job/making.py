@@ -35,11 +35,18 @@ class Making:
     def make(self, count: int) -> None:
         """Have ``count`` rows ready, or all up to where it stands. Raises MotionError, ProgramError."""
         while len(self.ready) < count and not self.ended:
-            rows, self.stop, self.ended = self.score.rows(self.tick, self.tick + min(count, CHUNK))
+            if (room := self._room()) <= 0:
+                return
+            rows, self.stop, self.ended = self.score.rows(self.tick, self.tick + min(count, CHUNK, room))
             self.tick += len(rows)
             self.ready.append(self._stage.push(rows))
             if self.ended and (rest := self._stage.flush()) is not None:
                 self.ready.append(rest)
+
+    def _room(self) -> int:
+        """Rows the plan has, or can be made to have."""
+        part = self.score.part_at(self.tick)
+        return part.course.room(part.pace.start(float(self.tick)).u)
 
     def look(self, until: int) -> None:
         """Raises MotionError for what cannot be done up to a tick."""

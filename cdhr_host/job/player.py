@@ -147,6 +147,10 @@ class Player:
         course = Course(self.staircase.fork(), Tape(commands))
         self._play(Kind.PROGRAM, course, min(self.feed, 1.0))
 
+    def lines(self, course: Course) -> None:
+        """Begin what a client's lines have planned so far."""
+        self._play(Kind.PROGRAM, course, min(self.feed, 1.0))
+
     def typed(self, text: str, kind: Kind = Kind.TYPED) -> bool:
         """Prove a short text, then begin it; whether anything is to move.
 

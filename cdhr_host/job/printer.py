@@ -21,7 +21,7 @@ from cdhr_host.job.acts import Acts
 from cdhr_host.job.player import Observer, Player
 from cdhr_host.job.program import ProgramFile, proven
 from cdhr_host.job.states import QUIET, Word, after
-from cdhr_host.job.surface import JobState, Listener, Reply, Status
+from cdhr_host.job.surface import JobState, LineFeed, Listener, Reply, Status
 from cdhr_host.job.telling import Telling
 from cdhr_host.job.typed import Typed
 from cdhr_host.job.waiting import wait_a_little
@@ -98,6 +98,15 @@ class Printer:
             self._acts.check_start()
             self._say(Word.START)
         self._ask(self._acts.start)
+
+    def open_stream(self, name: str) -> LineFeed:
+        """Print lines as a client sends them."""
+        with self._lock:
+            after(self._state, Word.OPEN)
+            if self._acts.busy or self._typed.busy:
+                raise JobError(Problem("busy", "the machine still moves", hint="wait until it stands"))
+            self._say(Word.OPEN, f"printing what {name} sends")
+            return self._acts.open(name)
 
     def hold(self, reason: str = "") -> None:
         """Come to rest on the path; where only typed G-code or a jog moves, that ends."""

@@ -27,7 +27,7 @@ class ArrivingTape(Tape):
 
     def room(self, u: float) -> int:
         """Ticks that are planned beyond a time of the plan; unbounded up to rest, and when ``hurried``."""
-        if self.hurried or self.rests or self.stop() is not None:
+        if self.stop() is not None or (self.hurried and not self.rests):
             return UNBOUNDED
         return max(math.floor(self.staircase.tick - u) - MARGIN, 0)
 
