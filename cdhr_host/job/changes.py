@@ -25,6 +25,8 @@ TRIES: Final = 8
 """how often a change is worked out anew when the link meanwhile has gone on"""
 SHARES: Final = (1.0, 0.6, 0.3, 0.1)
 """of a change, tried in this order"""
+SAME: Final = 1e-9
+"""of rates that are one"""
 BUG: Final = "please report this as a bug, with the program"
 FLOW_TIME: Final = 0.1
 """s in which the flow goes to another share"""
@@ -56,7 +58,7 @@ class Changes:
         score = self._feeder.score
         if score is None or self._feeder.standing or not self._feeder.settled:
             return
-        if score.last.pace.target != self.wanted:
+        if abs(score.last.pace.target - self.wanted) > SAME:
             self._late = 0.0
             self._retried(self._paced)
 
@@ -134,14 +136,17 @@ class Changes:
             make = partial(_made, part.pace, begin, target)
             yield from choices(ahead, make, first, share * abs(rate - now.rate), waits=waits)
 
-    def ahead(self, course: Course, u: float, first: int) -> Ahead:
-        """The plan from a time on, for as long as a change may take or up to where it stands."""
+    def ahead(self, course: Course, u: float, first: int, *, before: Setpoints | None = None) -> Ahead:
+        """The plan from a time on, for as long as a change may take or up to where it stands.
+
+        ``before``: rows before tick ``first`` where they are not those that were fed.
+        """
         profile = self._feeder.link.profile
         last = math.ceil(u + longest(profile) / self._feeder.period)
         course.plan(last)
         stop = course.stop()
         plan = course.rows(math.floor(u), min(last, stop.tick) if stop else last)
-        return Ahead(plan, self._before(first, plan), course.nozzle, profile)
+        return Ahead(plan, self._before(first, plan) if before is None else before, course.nozzle, profile)
 
     def _before(self, first: int, plan: Setpoints) -> Setpoints:
         before = self._feeder.before(first)

@@ -12,12 +12,13 @@ from cdhr_host.drives.link import MachineLink
 from cdhr_host.errors import JobError, MotionError, Problem
 from cdhr_host.job.changes import Changes
 from cdhr_host.job.feeder import Feeder
+from cdhr_host.job.feeds import Feeds
 from cdhr_host.job.program import Program
 from cdhr_host.pipeline import Proof, Staircase
 from cdhr_host.pipeline.course import Course, Stop
 from cdhr_host.pipeline.score import Gain
 from cdhr_host.pipeline.tape import Tape
-from cdhr_host.units import KPA, MINUTE, MM
+from cdhr_host.units import MINUTE, MM, MM3
 from cdhr_host.values import Array, Feedback, Setpoints
 
 AHEAD: Final = 1 << 20
@@ -54,6 +55,7 @@ class Player:
         self.profile = link.profile
         self.feeder = Feeder(link)
         self.changes = Changes(self.feeder)
+        self.feeds = Feeds(self.feeder, self.changes)
         self.staircase = Staircase(link.profile)
         self.kind: Kind | None = None
         self._course: Course | None = None
@@ -84,27 +86,23 @@ class Player:
 
     def plan_time(self, before: float) -> float:
         """s of the program as written that are done; ``before`` if that is not known."""
-        place = self.feeder.place() if self.kind is Kind.PROGRAM else None
-        return before if place is None else place[1] * self.profile.drives.period
+        u = self.feeds.plan_time() if self.kind is Kind.PROGRAM else None
+        return before if u is None else u * self.profile.drives.period
 
     def check_flow(self, share: float, proof: Proof) -> None:
         """Raises JobError where the air cannot give this share of the flow a program needs."""
-        extruder = self.profile.extruder
-        most = proof.extremes["pressure_kpa"][2] * KPA if "pressure_kpa" in proof.extremes else 0.0
-        needed = extruder.pressure_threshold + share * (most - extruder.pressure_threshold)
-        if most > extruder.pressure_threshold and needed > extruder.pressure_max:
-            room = (extruder.pressure_max - extruder.pressure_threshold) / (
-                most - extruder.pressure_threshold
-            )
+        air = self.staircase.rig.air
+        most = proof.extremes["flow_mm3_s"][2] * MM3 if "flow_mm3_s" in proof.extremes else 0.0
+        if most > 0.0 and share > max(room := air.flow_max / most, 1.0):
             raise JobError(
                 Problem(
                     "override",
-                    f"a flow of {share:.0%} would need {needed / KPA:.4g} kPa, the air gives "
-                    f"{extruder.pressure_max / KPA:.4g} kPa",
-                    value=needed / KPA,
-                    limit=extruder.pressure_max / KPA,
-                    unit="kPa",
-                    hint=f"this program can have {math.floor(room * 100)} % at most",
+                    f"a flow of {share:.0%} would be {share * most / MM3:.4g} mm³/s, "
+                    f"the air can push {air.flow_max / MM3:.4g} mm³/s",
+                    value=share * most / MM3,
+                    limit=air.flow_max / MM3,
+                    unit="mm³/s",
+                    hint=f"this program can have {math.floor(max(room, 1.0) * 100)} % at most",
                 )
             )
 
@@ -115,6 +113,7 @@ class Player:
     def give_up(self) -> None:
         """A fault: what is played is not gone on with."""
         self.feeder.drop()
+        self.feeds.end()
         self._close()
         self.kind = self._course = None
 
@@ -124,6 +123,7 @@ class Player:
 
     def turn(self) -> Rest | None:
         """Feed and collect once; what has come to rest. Raises DriveError, MotionError, ProgramError."""
+        self.feeds.turn(moving=self.kind is Kind.PROGRAM and self.changes.wanted > 0.0)
         self.changes.settle()
         self.feeder.feed()
         self.collect()
@@ -150,6 +150,7 @@ class Player:
     def lines(self, course: Course) -> None:
         """Begin what a client's lines have planned so far."""
         self._play(Kind.PROGRAM, course, min(self.feed, 1.0))
+        self.feeds.end()  # what is to come is not known: nothing can be planned anew with another feed
 
     def typed(self, text: str, kind: Kind = Kind.TYPED) -> bool:
         """Prove a short text, then begin it; whether anything is to move.
@@ -188,6 +189,7 @@ class Player:
         self._close()
         ended = self.feeder.stop is not None and self.feeder.stop.pause is None
         self.feeder.end()
+        self.feeds.end()
         if ended and self._course is not None:
             self._stand_after(self._course.staircase)
         elif self.feeder.last is not None:
@@ -208,21 +210,22 @@ class Player:
 
     def go_on(self) -> None:
         """From rest back to speed."""
-        self.changes.go_on(min(self.feed, 1.0))
+        self.feeds.choose_at_rest()
+        self.changes.go_on(self.feeds.rate)
 
     def override(self, feed: float | None, flow: float | None, *, moving: bool) -> None:
-        """Other shares of feed and flow, at once while a program moves."""
-        if feed is not None:
-            self.feed = feed
-            if moving:
-                self.changes.pace(min(feed, 1.0))
-        if flow is not None:
-            self.gain = flow
+        """Other shares of feed and flow, at once while a program moves. Raises MotionError."""
+        if feed is not None or flow is not None:
+            self.feed, self.gain = feed or self.feed, flow or self.gain
+            self.feeds.want(self.feed, self.gain, moving=moving)
+        if flow is not None and self.kind is Kind.PROGRAM:
             self.changes.flow(flow)
 
     def _play(self, kind: Kind, course: Course, rate: float) -> None:
         share = self.gain if kind is Kind.PROGRAM else 1.0
         self.feeder.begin(course, rate, Gain(share, share))
+        if kind is Kind.PROGRAM:
+            self.feeds.begin(course, self.feed, self.gain)
         self.changes.begin(rate)
         self.kind, self._course = kind, course
 

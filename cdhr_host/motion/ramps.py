@@ -29,6 +29,8 @@ WAITS: Final = (0.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0, 1.25, 1.5
 """moments tried, of the longest time a plan takes to turn its acceleration round"""
 SHORTEST: Final = 4
 """ticks of a ramp"""
+LEAST: Final = 0.15
+"""change of the rate that every ramp has room for: what landing on a whole tick needs"""
 SLACK: Final = 1.005
 """of the jerk, measured over three ticks, that counts as keeping its limit"""
 ROUNDING: Final = 1e-9
@@ -115,7 +117,7 @@ def choices(
 ) -> Iterator[Pace]:
     """Paces from tick ``first`` on that keep the limits, soonest settled first."""
     period, profile = ahead.profile.drives.period, ahead.profile
-    least = bound(profile, *ahead.speeds, max(change, 1e-3)) / period
+    least = bound(profile, *ahead.speeds, max(change, LEAST)) / period
     soonest = RATE_SLOPE * change * ahead.pushing / period
     begins = sorted({round(share * turning_time(profile) / period) for share in waits})
     lasting = sorted({max(SHORTEST, math.ceil(max(stretch * least, soonest))) for stretch in STRETCHES})

@@ -76,9 +76,10 @@ class Course:
         self._marks: deque[tuple[int, Staircase]] = deque()
         self.stops: deque[Stop] = deque()
         self._blocks: deque[Setpoints] = deque()
-        self._waiting: deque[Iterator[Checked]] = deque()
+        self._waiting: deque[tuple[int, Iterator[Checked]]] = deque()
         self.first = staircase.tick
         """the first tick of it"""
+        self._kept_from = self.first
 
     @property
     def over(self) -> bool:
@@ -160,6 +161,13 @@ class Course:
             self._marks.popleft()
         while self._blocks and int(self._blocks[0].tick[-1]) < before:
             self._blocks.popleft()
+        self._kept_from = max(self._kept_from, before)
+        while self._waiting and self._waiting[0][0] <= before:
+            self._waiting.popleft()
+
+    def forget(self, before: int) -> None:
+        """Commands below this number are not planned anew any more, by nobody."""
+        self._tape.forget(before)
 
     def room(self, u: float) -> int:  # noqa: ARG002 - a whole text is planned whenever asked for
         """Ticks that may be played on from a time of the plan without bringing it to rest for that."""
@@ -173,9 +181,7 @@ class Course:
         """The same text from the last border before a time of the plan on, planned with another feed."""
         cause = self.placed_at(u).cause
         machine = next(machine for at, machine in reversed(self._marks) if at == cause)
-        other = Course(machine.fork(override), self._tape, at=cause, opens=False, ends=self._ends)
-        other.first = machine.tick
-        return other
+        return Course(machine.fork(override), self._tape, at=cause, opens=False, ends=self._ends)
 
     def _planned(self, *, opens: bool) -> Iterator[object]:
         if opens:
@@ -195,7 +201,7 @@ class Course:
         for step in steps:
             placed = Placed(step, self._at)
             self._placed.append(placed)
-            self._waiting.append(self._blocks_of(step))
+            self._waiting.append((placed.end, self._blocks_of(step)))
             yield placed
 
     def _told(self, command: Command) -> Iterator[Command]:
@@ -210,7 +216,7 @@ class Course:
             return
         for first in range(step.ticks.start, step.ticks.stop, BLOCK):
             last = min(first + BLOCK, step.ticks.stop)
-            if last > self.first:
+            if last > self._kept_from:
                 yield self.staircase.checked(step.track(np.arange(first, last)))
 
     def _computed(self) -> Setpoints:
@@ -218,7 +224,7 @@ class Course:
         while True:
             while not self._waiting and not self._over:
                 self.plan(self.staircase.tick)
-            if (checked := next(self._waiting[0], None)) is None:
+            if (checked := next(self._waiting[0][1], None)) is None:
                 self._waiting.popleft()
             elif checked.problems:
                 raise MotionError(checked.problems)

@@ -14,6 +14,7 @@ import numpy as np
 
 from cdhr_host.errors import MotionError
 from cdhr_host.motion.playback import Beat, Pace, played
+from cdhr_host.motion.ramps import HISTORY
 from cdhr_host.motion.sampling import mean
 from cdhr_host.pipeline.course import Course, Stop, joined
 from cdhr_host.pipeline.shift import played_shift
@@ -101,6 +102,10 @@ class Score:
         part = self.part_at(tick)
         start = part.pace.start(float(tick))
         return part.course, start.u, start.rate
+
+    def before(self, tick: int) -> Setpoints:
+        """The rows just before a tick, as many as a change's jerk sees."""
+        return self.rows(max(tick - HISTORY, self.parts[0].tick), tick)[0]
 
     def rows(self, first: int, last: int) -> tuple[Setpoints, Stop | None, bool]:
         """Rows of ticks first to last - 1 at most, the stop they reach, and whether they end at rest.

@@ -1,0 +1,87 @@
+"""The same place on the way in two plans of one text that were made with different feeds."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdhr_host.motion.leg import Leg
+from cdhr_host.motion.sampling import Timed
+from cdhr_host.motion.time_law import TimeLaw
+from cdhr_host.pipeline.course import Course, Placed
+from cdhr_host.values import Array
+
+NEAR = 1e-9
+"""m or s beyond a stretch that are rounding"""
+
+
+@dataclass(frozen=True, slots=True)
+class Spot:
+    """A place on a drawn leg, or a moment of a stand."""
+
+    number: int
+    """of the leg, or of the one that follows the stand"""
+    moves: bool
+    s: float
+    """m of the drawn leg, or s since the stand began"""
+    speed: float = 0.0
+    """m/s, s' of the plan"""
+    acceleration: float = 0.0
+    """m/s², s'' of the plan"""
+
+
+def spot(course: Course, u: float) -> Spot | None:
+    """Where a time of a plan is, in ticks; None on a shift."""
+    step = course.placed_at(u).step
+    if not isinstance(step, Timed):
+        return None
+    t = min(max((u - step.begin) * step.period, 0.0), step.stretch.duration)
+    if not isinstance(step.stretch, Leg):
+        return Spot(step.stretch.number, False, t)
+    s, speed, acceleration = (float(part[0]) for part in step.stretch.law.at(np.array([t])))
+    return Spot(step.stretch.number, True, s + step.stretch.passed, speed, acceleration)
+
+
+def when(course: Course, place: Spot) -> float | None:
+    """Ticks of another plan of the same text at which it is there; None where that is not planned."""
+    for placed in course.placed():
+        if (found := _within(placed, place)) is not None:
+            return found
+    return None
+
+
+def beyond(course: Course, place: Spot) -> bool:
+    """Whether a course is planned further than a place already."""
+    steps = [each.step for each in course.placed() if isinstance(each.step, Timed)]
+    if not steps:
+        return False
+    last = steps[-1].stretch
+    if last.number != place.number:
+        return last.number > place.number
+    return isinstance(last, Leg) and (not place.moves or last.law.end + last.passed > place.s)
+
+
+def _within(placed: Placed, place: Spot) -> float | None:
+    step = placed.step
+    if not isinstance(step, Timed) or step.stretch.number != place.number:
+        return None
+    stretch = step.stretch
+    if not isinstance(stretch, Leg):
+        here = not place.moves and place.s <= stretch.duration + NEAR
+        return step.begin + min(place.s, stretch.duration) / step.period if here else None
+    s = place.s - stretch.passed
+    first = float(stretch.law.state[0, 0])
+    if not place.moves or not first - NEAR <= s <= stretch.law.end + NEAR:
+        return None
+    return step.begin + time_of(stretch.law, s) / step.period
+
+
+def time_of(law: TimeLaw, s: float) -> float:
+    """s at which a law reaches a place, by halving the piece it lies on."""
+    piece = max(int(np.searchsorted(law.state[0], s, side="right")) - 1, 0)
+    low = float(law.t[piece])
+    high = float(law.t[piece + 1]) if piece + 1 < len(law.t) else law.duration
+    for _ in range(60):
+        middle = (low + high) / 2
+        at: Array = law.at(np.array([middle]))[0]
+        low, high = (middle, high) if at[0] < s else (low, middle)
+    return (low + high) / 2
