@@ -65,6 +65,11 @@ class MachineLink(Protocol):
         """M a setpoint is rounded to on its way; 0 when it is not."""
         ...
 
+    @property
+    def slider(self) -> Array:
+        """(6,) m from the reference pose, where the sliders stand, as measured last; not while CLOSED."""
+        ...
+
     def timing(self) -> CycleTiming | None:
         """How punctual the cycles since arming were; None for a link without cycles of its own."""
         ...

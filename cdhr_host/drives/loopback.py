@@ -49,6 +49,11 @@ class Loopback(BufferedLink):
         """M: the rows are taken as they are."""
         return 0.0
 
+    @property
+    def slider(self) -> Array:
+        """(6,) m, of the simulated machine."""
+        return self._plant.slider
+
     def open(self) -> None:
         """CLOSED -> OPEN; an earlier fault is forgotten."""
         self._expect(LinkState.CLOSED)

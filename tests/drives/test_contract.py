@@ -90,6 +90,23 @@ def test_everything_fed_comes_back_exactly_once_in_order(far):
     assert np.abs(feedback.slider - rows.slider).max() < 1e-4
 
 
+def test_it_says_where_the_sliders_stand(far):
+    link, clock = far
+    assert np.abs(link.slider).max() < 1e-6
+    link.arm(ZERO)
+    link.feed(run_of(1500))
+    clock.wait_until(clock.now() + 0.3)
+    link.stop()
+    found = _drain(link, clock, lambda: link.state is LinkState.STOPPED)
+    clock.wait_until(clock.now() + 0.2)
+    link.feedback()
+    assert np.abs(found.setpoint[-1]).max() > 1e-4
+    assert np.abs(link.slider - found.setpoint[-1]).max() < 2e-6
+    link.close()
+    link.open()
+    assert np.abs(link.slider - found.setpoint[-1]).max() < 2e-6
+
+
 def test_credit_is_what_feed_accepts(far):
     link, _ = far
     assert link.free == 0

@@ -54,6 +54,12 @@ class PumpedBridge:
         """First tick of the stop."""
         return self._link.stop_tick
 
+    @property
+    def slider(self) -> Array:
+        """(6,) m, as last told."""
+        with self._lock:
+            return self._link.slider
+
     def timing(self) -> CycleTiming | None:
         """The bridge keeps time."""
         return self._link.timing()
