@@ -113,8 +113,8 @@ class Course:
         """The dry run's rows of ticks first to last - 1. Raises MotionError for what cannot be done."""
         while not self._blocks or int(self._blocks[-1].tick[-1]) + 1 < last:
             self._blocks.append(self._computed())
-        parts = [_cut(block, first, last) for block in self._blocks]
-        return joined([part for part in parts if len(part)])
+        touched = (each for each in self._blocks if each.tick[0] < last and each.tick[-1] >= first)
+        return joined([_cut(block, first, last) for block in touched])
 
     def stop(self) -> Stop | None:
         """Where playback must stand next, if that is planned already."""
