@@ -81,25 +81,26 @@ class Reader:
         message: str,
         seen: Seen,
         *,
+        standing: tuple[Array, Array, Array],
         overrides: tuple[float, float],
         homed: bool,
         referenced: bool,
         buffered: int,
         progress: Progress | None,
     ) -> Status:
-        """All of it; cheap."""
+        """All of it; cheap. ``standing``: nozzle, upper platform, sliders before anything was executed."""
         rows, feedback = seen.rows, seen.feedback
         nothing = rows is None or feedback is None
-        place = self._cables.reference_G if rows is None else rows.nozzle_G[-1]
+        nozzle, upper, slider = standing
         return Status(
             state=state,
             message=message,
             line=0 if rows is None else int(rows.line[-1]),
-            nozzle_G=place,
-            upper=np.zeros(3) if rows is None else rows.upper[-1],
+            nozzle_G=nozzle if rows is None else rows.nozzle_G[-1],
+            upper=upper if rows is None else rows.upper[-1],
             velocity=self._speed(rows),
-            slider=np.zeros(6) if feedback is None else feedback.slider[-1],
-            slider_setpoint=np.zeros(6) if rows is None else rows.slider[-1],
+            slider=slider if feedback is None else feedback.slider[-1],
+            slider_setpoint=slider if rows is None else rows.slider[-1],
             tension=np.full(9, np.nan) if rows is None else self._nine(rows),
             window=self._window,
             force=np.full(3, np.nan) if feedback is None or not len(feedback.force) else feedback.force[-1],

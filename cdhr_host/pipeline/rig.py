@@ -13,9 +13,11 @@ from cdhr_host.mechanism import (
     UpperMotion,
     cable_state,
     direction_change_bound,
+    forward,
     lengths,
     nine_tensions,
     slider,
+    stretched_forward,
     tensions,
     upper_bounds,
 )
@@ -90,6 +92,17 @@ class Rig:
         """(N, 6) m, (N, 6) N -> (N, 6) m: where the sliders stand."""
         rigid = slider(self.cables, length)
         return rigid if self.give is None else rigid + self.give.slider_correction(tension)
+
+    def standing(self, slider: Array) -> tuple[Array, Array]:
+        """(6,) m -> (3,) nozzle in G, (3,) displacement of the upper platform, m, at rest there.
+
+        Raises MotionError where no pose has these cable lengths.
+        """
+        if self.give is None:
+            lower, upper = forward(self.cables, (self.cables.reference_lengths + slider)[None])
+        else:
+            lower, upper = stretched_forward(self.cables, self.loads, self.give, slider[None])
+        return self.cables.reference_G + lower[0], upper[0]
 
     def slider_places(self, track: ToolTrack) -> Array:
         """(N, 6) m: as ``sliders``, with no more worked out than that needs."""
