@@ -31,6 +31,7 @@ def direction_change_bound(profile: Profile) -> float:
     shape, bed = profile.geometry, profile.bed
     platform = max(shape.lower_attachment_radius, shape.upper_attachment_radius)
     rho = shape.pulley_circle_radius - platform - bed.radius - math.hypot(bed.origin_x, bed.origin_y)
+    rho -= profile.calibration.greatest()
     return 1.0 / rho + 1.0 / math.sqrt(rho**2 - shape.pulley_radius**2)
 
 

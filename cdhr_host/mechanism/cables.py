@@ -39,7 +39,7 @@ class Cables:
     @classmethod
     def from_profile(cls, profile: Profile) -> "Cables":
         """Table A1 as the profile gives it; the profile must be free of inconsistencies."""
-        shape, bed = profile.geometry, profile.bed
+        shape, bed, found = profile.geometry, profile.bed, profile.calibration
         pulley = PULLEYS[shape.pulley_model]
         top = shape.reference_height + shape.reference_separation
         anchors = [
@@ -51,12 +51,15 @@ class Cables:
             *_ring(shape.upper_attachment_radius, top),
         ]
         return cls(
-            anchors=_fixed(anchors),
-            attachments=_fixed(attachments),
+            anchors=_fixed(np.array(anchors) + found.pulleys()),
+            attachments=_fixed(np.array(attachments) + found.attachments()),
             signs=_fixed([-1.0, -1.0, -1.0, 1.0, 1.0, 1.0]),
             pulley_radius=shape.pulley_radius,
             reference_lengths=_fixed([0.0] * 6),
-            reference_G=_fixed([-bed.origin_x, -bed.origin_y, shape.reference_height - bed.origin_z]),
+            reference_G=_fixed(
+                np.array([-bed.origin_x, -bed.origin_y, shape.reference_height - bed.origin_z])
+                + found.reference()
+            ),
             azimuths=_fixed(AZIMUTHS + AZIMUTHS),
             pulley=pulley,
         ).with_pulley(pulley)
@@ -79,16 +82,20 @@ class Loads:
     rest_length: float
     separation: float
     """m: the upper attachment point above the lower one at the reference pose"""
+    aside: tuple[float, float] = (0.0, 0.0)
+    """m: and beside it in x and y, where calibration found that"""
 
     @classmethod
     def from_profile(cls, profile: Profile) -> "Loads":
         """[platforms], [spring] and the reference separation."""
+        x, y, z = profile.calibration.reference().tolist()
         return cls(
             lower_mass=profile.platforms.lower_mass,
             upper_mass=profile.platforms.upper_mass,
             stiffness=profile.spring.stiffness,
             rest_length=profile.spring.rest_length,
-            separation=profile.geometry.reference_separation,
+            separation=profile.geometry.reference_separation - z,
+            aside=(-x, -y),
         )
 
 

@@ -127,7 +127,7 @@ def tension_stiffness(cables: Cables, loads: Loads, lower: Array, upper: Array, 
 
 def spring_stiffness(loads: Loads, offset: Array) -> Array:
     """(N, 3) m between the platforms' displacements -> (N, 3, 3) N/m: of the force on either platform."""
-    span = offset + loads.separation * UNITS[2]
+    span = offset + np.array([*loads.aside, loads.separation])
     size = np.linalg.norm(span, axis=1)[:, None, None]
     along = span[:, :, None] * span[:, None, :] / size**2
     slack = loads.rest_length / size

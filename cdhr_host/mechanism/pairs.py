@@ -43,9 +43,10 @@ class Pairs:
         radius, half = profile.geometry.lower_attachment_radius, 0.5 * profile.geometry.pair_spacing
         out = np.array([[np.cos(beta), np.sin(beta), 0.0] for beta in AZIMUTHS])
         along = np.array([[-np.sin(beta), np.cos(beta), 0.0] for beta in AZIMUTHS])
+        moved = profile.calibration.arms()[:3]
         return cls(
-            left=radius * out + half * along,
-            right=radius * out - half * along,
+            left=radius * out + half * along + moved,
+            right=radius * out - half * along + moved,
             least=profile.forces.single_min,
             greatest=profile.forces.single_max,
         )

@@ -45,8 +45,8 @@ class Policy:
     """The upper platform's displacement as a function of the lower one's."""
 
     loads: Loads
-    height: float = 0.0
-    """m: constant offset, where there is no field"""
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """m: constant, where there is no field"""
     field: SpringField | None = None
 
     @classmethod
@@ -57,7 +57,7 @@ class Policy:
             return cls(loads)
         if wanted == "preload":
             span = loads.rest_length + profile.spring.preload / loads.stiffness
-            return cls(loads, span - loads.separation)
+            return cls(loads, (-loads.aside[0], -loads.aside[1], span - loads.separation))
         return cls(loads, field=_fitted(_Fitted(profile), wanted == "vertical"))
 
     def upper(self, lower: Array) -> Array:
@@ -68,7 +68,7 @@ class Policy:
     def follow(self, lower: Array, velocity: Array, acceleration: Array) -> UpperMotion:
         """(N, 3) each of the lower platform, m, m/s, m/s² -> UpperMotion, with exact derivatives."""
         if self.field is None:
-            return UpperMotion(lower + np.array([0.0, 0.0, self.height]), velocity, acceleration)
+            return UpperMotion(lower + np.array(self.offset), velocity, acceleration)
         moved = UpperMotion(*(np.empty_like(lower) for _ in range(3)))
         for rows in block_rows(len(lower)):
             motion = [components(part, rows) for part in (lower, velocity, acceleration)]
@@ -101,11 +101,12 @@ class Policy:
 
 
 def _offset(loads: Loads, spring: tuple[Jet, Jet, Jet]) -> tuple[Jet, Jet, Jet]:
-    """Upper minus lower displacement: s / k + L0 s / |s| less the separation."""
+    """Upper minus lower displacement: s / k + L0 s / |s| less what is between them at the reference."""
     x, y, z = spring
     square = x.times(x).plus(y.times(y)).plus(z.times(z))
     longer = square.inverse_root().scaled(loads.rest_length).shifted(1.0 / loads.stiffness)
-    return x.times(longer), y.times(longer), z.times(longer).shifted(-loads.separation)
+    aside = (x.times(longer).shifted(-loads.aside[0]), y.times(longer).shifted(-loads.aside[1]))
+    return *aside, z.times(longer).shifted(-loads.separation)
 
 
 class _Fitted:
@@ -113,7 +114,7 @@ class _Fitted:
 
     def __init__(self, profile: Profile) -> None:
         self.profile = profile
-        parts = profile.geometry, profile.spring, profile.platforms, profile.forces
+        parts = profile.geometry, profile.calibration, profile.spring, profile.platforms, profile.forces
         self._parts = tuple(part.model_dump_json() for part in parts)
 
     def __eq__(self, other: object) -> bool:

@@ -44,6 +44,10 @@ class Wrap(Protocol):
         """BC, m: from the attachment to where the cable meets the pulley. Eq. (7)."""
         ...
 
+    def per_radius(self) -> Array:
+        """(N,): dl/dr, by how much a wider groove makes the cable longer."""
+        ...
+
 
 Pulley = Callable[[Array, Array, Array, "Array | float", float, "Array | float"], Wrap]
 """x, y, z, sign, radius, azimuth -> the cable"""
@@ -90,6 +94,10 @@ class PointWrap:
     def straight(self) -> Vector:
         """BA, m."""
         return self._line
+
+    def per_radius(self) -> Array:
+        """(N,): 0, there is no groove."""
+        return np.zeros_like(self._length)
 
 
 class Groove:
@@ -171,6 +179,10 @@ class SwivelWrap:
         """BC, m: along the direction."""
         return scaled(self.direction(), self._groove.line)
 
+    def per_radius(self) -> Array:
+        """(N,): theta; what the tangent point does to arc and straight part cancels."""
+        return self._groove.angle()
+
 
 class _Hung:
     """A pulley whose entry is tied to an azimuth: BA in that frame."""
@@ -240,6 +252,10 @@ class FixedPlaneWrap(_Hung):
         groove, r = self._groove, self._radius
         return self._world(self._out - r * groove.sin, self._aside, self._rise + r * groove.cos)
 
+    def per_radius(self) -> Array:
+        """(N,): theta, and r (1/Lp - 1/L) of the sideways part."""
+        return self._groove.angle() + self._radius * (1.0 / self._groove.line - 1.0 / self._line)
+
 
 class CasterWrap(_Hung):
     """Pulley swivelling about the horizontal line on which the cable enters it.
@@ -279,6 +295,10 @@ class CasterWrap(_Hung):
     def straight(self) -> Vector:
         """BC, m: along the direction."""
         return scaled(self.direction(), self._groove.line)
+
+    def per_radius(self) -> Array:
+        """(N,): theta, and sin(theta) d(h - r)/dr of the line that moves with the groove."""
+        return self._groove.angle() + self._groove.sin * (self._drop / self._hang - 1.0)
 
 
 PULLEYS: Final[dict[str, Pulley]] = {

@@ -144,7 +144,7 @@ def offset(loads: Loads, spring: Vector) -> Vector:
     x, y, z = spring
     size = np.sqrt(x * x + y * y + z * z)
     longer = 1.0 / loads.stiffness + loads.rest_length / size
-    return x * longer, y * longer, z * longer - loads.separation
+    return x * longer - loads.aside[0], y * longer - loads.aside[1], z * longer - loads.separation
 
 
 def _answer(cables: Cables, loads: Loads, pairs: Pairs, places: Array, spring: Array) -> Response:

@@ -67,7 +67,7 @@ def spring_force(loads: Loads, lower: Vector, upper: Vector, start: int = 0) -> 
     v is the vector between the attachment points. Raises MotionError where it vanishes.
     """
     x, y, z = (above - below for above, below in zip(upper, lower, strict=True))
-    z = z + loads.separation
+    x, y, z = x + loads.aside[0], y + loads.aside[1], z + loads.separation
     span = np.sqrt(x * x + y * y + z * z)
     if not span.min() > 0.0:
         raise MotionError(

@@ -102,7 +102,8 @@ class Bodies:
         self._lower_cables = tuple(zip(range(6), strands.wrapped, arms, strict=False))
         self._upper_cables = tuple(enumerate(strands.wrapped))[6:]
         self._centre = strands.lower[0], strands.lower[1], strands.lower[2] - arm
-        self._gap = strands.upper[2] - strands.lower[2]
+        (lx, ly, lz), (tx, ty, tz) = strands.lower, strands.upper
+        self._gap = tx - lx, ty - ly, tz - lz
         rest = self._rest = _at_reference(strands)
         dead = (profile.stretch.lower_dead_length,) * 6 + (profile.stretch.upper_dead_length,) * 3
         self.stiffness = tuple(
@@ -247,8 +248,8 @@ class Bodies:
     def _span(self, lower: Point, upper: Point, axis: Point) -> Point:
         """Between the ends of the spring, m, upwards; ``axis`` is the lower platform's own z."""
         (x, y, z), (ux, uy, uz), h = lower, upper, self.build.mass_height
-        ex, ey, ez = axis
-        return ux - x + h * ex, uy - y + h * ey, uz - z + h * ez + self._gap - h
+        (ex, ey, ez), (gx, gy, gz) = axis, self._gap
+        return ux - x + h * ex + gx, uy - y + h * ey + gy, uz - z + h * ez + gz - h
 
     def _total(self, motion: Motion, law: Tension, felt: list[float]) -> tuple[Point, Point, Point]:
         """All loads but weight: force and moment on the lower platform, force on the upper one."""

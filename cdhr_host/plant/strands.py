@@ -116,9 +116,10 @@ class Strands:
 
         Raises KeyError for a machine without pulleys.
         """
-        shape = profile.geometry
+        shape, known = profile.geometry, profile.calibration
         model = MODELS[pulley or shape.pulley_model]
-        off = np.zeros((6, 3)) if moved is None else moved
+        off = known.pulleys() + (np.zeros((6, 3)) if moved is None else moved)
+        own = known.arms()
         half = 0.5 * shape.pair_spacing
         top = shape.reference_height + shape.reference_separation
         wrapped, arms = [], []
@@ -126,13 +127,15 @@ class Strands:
             for i, beta in enumerate(AZIMUTHS):
                 anchor = _ringed(shape.pulley_circle_radius, along, beta, shape.lower_pulley_height)
                 wrapped.append(model(_shifted(anchor, off[i]), beta, -1.0, shape.pulley_radius))
-                arms.append(_ringed(shape.lower_attachment_radius, along, beta, 0.0))
+                arms.append(_shifted(_ringed(shape.lower_attachment_radius, along, beta, 0.0), own[i]))
         for i, beta in enumerate(AZIMUTHS):
             # a round upper platform that does not turn is its cables' meeting point, moved outwards
             reach = shape.pulley_circle_radius - shape.upper_attachment_radius
             anchor = _ringed(reach, 0.0, beta, shape.upper_pulley_height)
-            wrapped.append(model(_shifted(anchor, off[3 + i]), beta, 1.0, shape.pulley_radius))
-        return cls(tuple(wrapped), tuple(arms), (0.0, 0.0, shape.reference_height), (0.0, 0.0, top))
+            place = _shifted(anchor, off[3 + i] - own[3 + i])
+            wrapped.append(model(place, beta, 1.0, shape.pulley_radius))
+        level = _shifted((0.0, 0.0, shape.reference_height), known.reference())
+        return cls(tuple(wrapped), tuple(arms), level, (0.0, 0.0, top))
 
 
 def _ringed(radius: float, along: float, beta: float, height: float) -> Point:

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from cdhr_host.profile.body import Forces, Geometry, Machine, Platforms, Sliders, Spring, Stretch
+from cdhr_host.profile.calibration import Calibration
 from cdhr_host.profile.clay import Clay
 from cdhr_host.profile.fields import (
     IN_DEG,
@@ -316,6 +317,7 @@ class Profile(Section):
     platforms: Platforms
     forces: Forces
     stretch: Stretch = Stretch()
+    calibration: Calibration = Calibration()
     sliders: Sliders
     limits: Limits
     path: PathRules

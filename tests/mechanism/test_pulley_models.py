@@ -1,6 +1,7 @@
 """The four pulley models: stored lengths, slopes, rates, round trips, and how far they are apart."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +60,19 @@ def test_direction_is_the_gradient(any_machine: Machine, model: str) -> None:
         move = step * np.eye(3)[axis]
         rise = lengths(cables, lower + move, upper + move) - lengths(cables, lower - move, upper - move)
         assert_allclose(slope[:, :, axis], rise / (2 * step), rtol=0, atol=1e-9)
+
+
+@MODELS
+def test_a_wider_groove_makes_the_cable_longer(any_machine: Machine, model: str) -> None:
+    cables, step = any_machine.cables.with_pulley(PULLEYS[model]), 1e-6
+    lower, upper = poses(47)
+    places = [components(part, slice(0, COUNT)) for part in (lower, upper)]
+    slopes = np.array([wrap.per_radius() for wrap in six_wraps(cables, *places)]).T
+    wide, narrow = (
+        lengths(replace(cables, pulley_radius=cables.pulley_radius + way), lower, upper)
+        for way in (step, -step)
+    )
+    assert_allclose(slopes, (wide - narrow) / (2 * step), rtol=0, atol=1e-8)
 
 
 @MODELS

@@ -11,7 +11,16 @@ from plant_machines import profile_of
 from scipy.integrate import solve_ivp
 
 from cdhr_host.errors import MotionError
-from cdhr_host.mechanism import Cables, jacobian, lengths, slider, tensions, trajectories
+from cdhr_host.mechanism import (
+    Cables,
+    Pairs,
+    jacobian,
+    lengths,
+    nine_tensions,
+    slider,
+    tensions,
+    trajectories,
+)
 from cdhr_host.mechanism.cables import Loads
 from cdhr_host.mechanism.kinematics import components, wraps_of
 from cdhr_host.mechanism.pulley import PULLEYS
@@ -23,6 +32,8 @@ from cdhr_host.plant.rig import LONGEST_STEP, Rig, RigState, paired
 from cdhr_host.plant.servo import Servo
 from cdhr_host.plant.strands import MODELS, Strands
 from cdhr_host.plant.turning import rotation, rotation_vector, turned
+from cdhr_host.profile import Profile
+from cdhr_host.profile.calibration import Calibration
 
 STILL = (0.0,) * 6
 
@@ -46,6 +57,38 @@ def test_strands_are_the_mechanism_cables(model: str) -> None:
         top = np.add(strands.upper, place)
         for i in (6, 7, 8):
             assert_allclose(strands.wrapped[i](*top)[1:], pulls[i - 3, :, n], atol=1e-12)
+
+
+def calibrated(name: str) -> Profile:
+    """A machine a few millimetres away from its drawing."""
+    rng = np.random.default_rng(31)
+    found = Calibration(
+        pulley_shift_mm=rng.normal(0.0, 3.0, (6, 3)).tolist(),
+        attachment_shift_mm=rng.normal(0.0, 0.5, (6, 3)).tolist(),
+        reference_shift_mm=[1.5, -2.0, 1.0],
+    )
+    return profile_of(name).model_copy(update={"calibration": found})
+
+
+@pytest.mark.parametrize("model", list(MODELS))
+def test_a_calibrated_machine_is_the_same_in_plan_and_simulation(model: str) -> None:
+    """Sliders, and forces at rest: six by the mechanism, nine by the plant."""
+    profile = calibrated("paper")
+    cables, loads = Cables.from_profile(profile).with_pulley(PULLEYS[model]), Loads.from_profile(profile)
+    strands = Strands.from_profile(profile, model)
+    held, q = Held(strands), poses(5)
+    run = slider(cables, lengths(cables, q, q))
+    for place, row in zip(q.tolist(), run, strict=True):
+        assert_allclose(held.lengths(tuple(place), tuple(place)), row, atol=1e-12)
+    if model == "fixed-plane":
+        return
+    bodies = Bodies(profile, strands)
+    nine = nine_tensions(cables, loads, Pairs.from_profile(profile), q, q)
+    for place, force in zip(q.tolist(), nine.tolist(), strict=True):
+        state = BodiesState(lower=tuple(place), upper=tuple(place))
+        after = bodies.step(state, Forces(force), 1e-3)
+        moved = [np.abs(np.subtract(a, b)).max() for a, b in zip(after[:6], state[:6], strict=True)]
+        assert max(moved) < 1e-12
 
 
 @pytest.mark.parametrize("model", list(MODELS))
