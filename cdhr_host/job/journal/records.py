@@ -42,8 +42,6 @@ class Fed:
     """How far the drives may get by themselves: written before they are fed."""
 
     line: int
-    place_m: float
-    """drawn length since the program's start"""
     plan_tick: float
     """of the program's plan at 100 %"""
 
@@ -55,10 +53,10 @@ class Executed:
     tick: int
     """the drives' own"""
     line: int
-    place_m: float
-    """drawn length since the program's start"""
     plan_tick: float
     """of the program's plan at 100 %"""
+    nozzle_mm: tuple[float, float, float]
+    """commanded, in G"""
     counts: tuple[int, int, int, int, int, int]
     """encoder counts"""
     air: bool
