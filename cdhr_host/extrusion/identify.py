@@ -70,7 +70,8 @@ def bead_section(width: Array, height: Array) -> Array:
     A bead no wider than high is taken for an ellipse of that width and height.
     """
     flanked = (width - height) * height + np.pi * height**2 / 4.0
-    return np.asarray(np.where(width > height, flanked, np.pi * width * height / 4.0))
+    section: Array = np.where(width > height, flanked, np.pi * width * height / 4.0)
+    return section
 
 
 def identify_flow(weighings: Weighings, bores: tuple[Channel, ...]) -> FlowCurve:
@@ -84,7 +85,7 @@ def identify_flow(weighings: Weighings, bores: tuple[Channel, ...]) -> FlowCurve
 
     def residual(parameters: Array) -> Array:
         flow = law(parameters).flow(weighings.pressure)
-        return np.arcsinh(flow / floor) - np.arcsinh(weighings.flow / floor)
+        return np.asarray(np.arcsinh(flow / floor) - np.arcsinh(weighings.flow / floor))
 
     most = weighings.pressure.max() / ChannelFlow(Material(1.0, 1.0, 1.0), bores).threshold
     bounds = np.array([0.0, -20.0, INDEX_BOUNDS[0]]), np.array([most, 20.0, INDEX_BOUNDS[1]])
