@@ -7,7 +7,7 @@ from contextlib import suppress
 from cdhr_host.drives.clock import Clock
 from cdhr_host.drives.link import LinkState
 from cdhr_host.drives.rows import joined
-from cdhr_host.errors import CdhrError, JobError, Problem
+from cdhr_host.errors import CdhrError, JobError, MotionError, Problem
 from cdhr_host.job.line_stream import LineStream
 from cdhr_host.job.lines import Lines
 from cdhr_host.job.player import Kind, Player, Rest
@@ -57,6 +57,7 @@ class Acts:
             state,
             self.message,
             self._seen,
+            standing=player.standing,
             overrides=(player.feed, player.gain),
             homed=player.homed,
             referenced=player.link.state is not LinkState.CLOSED,
@@ -122,11 +123,28 @@ class Acts:
 
     def resume(self) -> None:
         """Back to speed on the path."""
-        if not self._lines.resumed():
-            self.player.go_on()
+        player = self.player
+        if self._lines.resumed():
+            return
+        try:
+            returning = player.aside is not None and player.back()
+        except MotionError as error:
+            self._telling.add("problem", error.problems[0].message, error.problems[0])
+            self._happened(Word.PAUSED, "the way back is not free: move the nozzle above the held place")
+            return
+        if not returning:
+            self._go_on()
+
+    def _go_on(self) -> None:
+        """From rest on the path."""
+        if self.player.aside is not None:
+            self.player.take_up()
+        self.player.go_on()
 
     def abort(self) -> None:
         """Come to rest; the lift follows."""
+        if self._lines.idle or self.player.aside is not None:
+            self.player.leave()
         if self._lines.idle:
             self._lift()
         elif self.player.kind is Kind.PROGRAM:
@@ -192,11 +210,18 @@ class Acts:
         if rest is None:
             if state is JobState.RESUMING and self.player.up_to_speed:
                 self._happened(Word.UP, "")
+            elif state is JobState.STOPPING and self.player.kind is None:
+                self._lift()
         elif rest.kind is Kind.PROGRAM:
             self._rested(rest, state)
         elif rest.kind is Kind.LIFT:
             self.player.over()
             self._happened(Word.LIFTED, self.message)
+        elif rest.kind is Kind.BACK:
+            self.player.over()
+            if state is JobState.RESUMING:
+                self._go_on()
+            self._happened(Word.RESTED, self.message)
 
     def _rested(self, rest: Rest, state: JobState) -> None:
         """The program stands."""

@@ -34,6 +34,8 @@ class Feeder:
         """(6,) m, where the sliders stand or were commanded last"""
         self._sent = RowQueue()
         self._done: Setpoints | None = None
+        self._tick: int | None = None
+        """executed last since the link was armed"""
         self._stop_known = False
 
     @property
@@ -69,20 +71,26 @@ class Feeder:
     @property
     def settled(self) -> bool:
         """Whether what was executed last was at a constant pace, or at rest."""
-        if self.score is None or self.last is None:
+        if self.score is None or self._tick is None:
             return True
-        return int(self.last.tick[0]) >= self.score.last.pace.settled
+        return self._tick >= self.score.last.pace.settled
 
     def begin(self, course: Course, rate: float, gain: Gain) -> None:
         """Play a course from its first tick; the machine is at rest."""
-        if self.link.state in (LinkState.OPEN, LinkState.STOPPED):
-            self.link.arm(self.slider)
-            self._sent.clear()
-            self._done, self._stop_known = None, False
+        if self.arm():
             self.next_tick = course.first
         pace = Pace.of(tick=self.next_tick, u=course.first, rate=rate)
         score = Score(course.staircase, (Part(self.next_tick, course, pace),), gain)
         self.making = Making(score, self.next_tick)
+
+    def arm(self) -> bool:
+        """Have the link take rows from where the sliders stand; whether it did not yet."""
+        if self.link.state not in (LinkState.OPEN, LinkState.STOPPED):
+            return False
+        self.link.arm(self.slider)
+        self._sent.clear()
+        self._done, self._tick, self._stop_known = None, None, False
+        return True
 
     def end(self) -> None:
         """The machine is at rest and stays so."""
@@ -115,7 +123,7 @@ class Feeder:
             raise DriveError(Problem("echo", "the drives executed more rows than were sent"))
         rows = self._sent.take(len(feedback))
         check_echo(rows, feedback, self.link.resolution)
-        self.last, self.slider = rows[-1:], rows.slider[-1]
+        self.last, self.slider, self._tick = rows[-1:], rows.slider[-1], int(rows.tick[-1])
         self._done = rows[-HISTORY:] if self._done is None else joined([self._done, rows])[-HISTORY:]
         self._forget(int(rows.tick[-1]))
         return [(rows, feedback)]
@@ -155,9 +163,9 @@ class Feeder:
 
     def place(self) -> tuple[Course, float, float] | None:
         """Course, time of its plan in ticks and rate of what was executed last."""
-        if self.score is None or self.last is None:
+        if self.score is None or self._tick is None:
             return None
-        return self.score.beat(int(self.last.tick[0]))
+        return self.score.beat(self._tick)
 
     def _plan_stop(self) -> None:
         """Once the link stops by itself, expect the stop's rows instead of those fed for these ticks."""

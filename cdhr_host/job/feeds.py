@@ -36,18 +36,18 @@ class Feeds:
     def __init__(self, feeder: Feeder, changes: Changes) -> None:
         self._feeder = feeder
         self._changes = changes
-        self._base: Course | None = None
+        self.base: Course | None = None
         self._wanted = 1.0
         self._flow = 1.0
         self._next_try = 0
 
     def begin(self, base: Course, feed: float, flow: float) -> None:
         """A program is begun as it is written."""
-        self._base, self._wanted, self._flow, self._next_try = base, feed, flow, 0
+        self.base, self._wanted, self._flow, self._next_try = base, feed, flow, 0
 
     def end(self) -> None:
         """Nothing is played any more."""
-        self._base = None
+        self.base = None
 
     @property
     def rate(self) -> float:
@@ -64,7 +64,7 @@ class Feeds:
 
     def turn(self, *, moving: bool) -> None:
         """Join the right course once that is possible, and keep the base at hand."""
-        base, score = self._base, self._feeder.score
+        base, score = self.base, self._feeder.score
         if base is None or score is None:
             return
         ready = self._feeder.settled and self._feeder.next_tick >= self._next_try
@@ -74,7 +74,7 @@ class Feeds:
 
     def plan_time(self) -> float | None:
         """Ticks of the program as written that are done; None where that is not known."""
-        base, place = self._base, self._feeder.place()
+        base, place = self.base, self._feeder.place()
         if base is None or place is None:
             return None
         course, u, _ = place
@@ -119,7 +119,7 @@ class Feeds:
 
     def _other(self, course: Course, u: float) -> Course | None:
         """The right course, planned from before a time of the course that is played on."""
-        base, override = self._base, self._override()
+        base, override = self.base, self._override()
         if base is None:
             return None
         there = u if course is base else self._on_base(course, u)
@@ -175,7 +175,7 @@ class Feeds:
 
     def _on_base(self, course: Course, u: float) -> float | None:
         here = spot(course, u)
-        return None if here is None or self._base is None else self._when(self._base, here)
+        return None if here is None or self.base is None else self._when(self.base, here)
 
     def _follow(self, base: Course) -> None:
         """Let go of what the base has behind the machine."""

@@ -10,21 +10,23 @@ import numpy as np
 
 from cdhr_host.drives.link import MachineLink
 from cdhr_host.errors import JobError, MotionError, Problem
+from cdhr_host.job.aside import Aside
 from cdhr_host.job.changes import Changes
 from cdhr_host.job.feeder import Feeder
 from cdhr_host.job.feeds import Feeds
 from cdhr_host.job.program import Program
+from cdhr_host.job.short import furthest, proven, straight, through
 from cdhr_host.pipeline import Proof, Staircase
 from cdhr_host.pipeline.course import Course, Stop
 from cdhr_host.pipeline.score import Gain
 from cdhr_host.pipeline.tape import Tape
-from cdhr_host.units import MINUTE, MM, MM3
+from cdhr_host.units import MM, MM3
 from cdhr_host.values import Array, Feedback, Setpoints
 
-AHEAD: Final = 1 << 20
-"""ticks: more than any typed text has"""
 STEP_SPEED: Final = 25 * MM
 """m/s of a single step"""
+BACK_SPEED: Final = 25 * MM
+"""m/s on the way back to a held program"""
 REFERENCE: Final = 50e-6
 """m from the reference pose that count as standing there"""
 Observer = Callable[[Setpoints, Feedback], None]
@@ -35,7 +37,10 @@ class Kind(Enum):
 
     PROGRAM = "program"
     TYPED = "typed"
+    JOG = "jog"
     LIFT = "lift"
+    BACK = "back"
+    """to the place where a program is held"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,12 +63,15 @@ class Player:
         self.feeds = Feeds(self.feeder, self.changes)
         self.staircase = Staircase(link.profile)
         self.kind: Kind | None = None
+        self.aside: Aside | None = None
+        """a held program, while something else moves the machine"""
         self._course: Course | None = None
         self.feed = 1.0
         self.gain = 1.0
         self.executed: tuple[Setpoints, Feedback] | None = None
         """the last batch"""
         self.observers: list[Observer] = []
+        self._adopt()
 
     @property
     def busy(self) -> bool:
@@ -77,8 +85,20 @@ class Player:
 
     @property
     def up_to_speed(self) -> bool:
-        """Whether what was executed last was at a constant pace."""
-        return self.feeder.settled
+        """Whether a program is played, and what was executed last was at a constant pace."""
+        return self.kind is Kind.PROGRAM and self.feeder.settled
+
+    @property
+    def standing(self) -> tuple[Array, Array, Array]:
+        """(3,) nozzle in G, (3,) the upper platform's displacement, (6,) sliders, m, when nothing moves."""
+        return self.staircase.standing_G, self.staircase.upper, self.feeder.slider
+
+    def _adopt(self) -> None:
+        """Take the machine to stand where its drives say; raises MotionError where no pose fits."""
+        slider = self.link.slider
+        if np.abs(slider).max() > REFERENCE:
+            self.feeder.slider = slider
+            self.staircase.stand_at(*self.staircase.rig.standing(slider))
 
     def refuse_start(self) -> None:
         """Raises JobError: a program begins at the reference pose only."""
@@ -115,6 +135,7 @@ class Player:
         self.feeder.drop()
         self.feeds.end()
         self._close()
+        self.leave()
         self.kind = self._course = None
 
     def _close(self) -> None:
@@ -152,32 +173,78 @@ class Player:
         self._play(Kind.PROGRAM, course, min(self.feed, 1.0))
         self.feeds.end()  # what is to come is not known: nothing can be planned anew with another feed
 
-    def typed(self, text: str, kind: Kind = Kind.TYPED) -> bool:
+    @property
+    def free(self) -> bool:
+        """Whether the machine stands and may be moved: what is held can be set aside."""
+        return self.kind is None or (self.kind is Kind.PROGRAM and self.feeder.at_rest)
+
+    def set_aside(self) -> None:
+        """Leave a held program where it is, to move the machine otherwise."""
+        if self.kind is not Kind.PROGRAM or self._course is None:
+            return
+        self.aside = Aside.of(self.feeder, self._course, self.feeds.base, self.staircase)
+        self.staircase = Staircase(self.profile, rig=self.staircase.rig)
+        assert self.feeder.last is not None
+        self.staircase.stand_at(self.feeder.last.nozzle_G[-1], self.feeder.last.upper[-1])
+        self.feeder.end()
+        self.kind = self._course = None
+
+    def back(self) -> bool:
+        """Begin the way back to the program set aside; whether there is any. Raises MotionError."""
+        assert self.aside is not None
+        places = self.aside.way_back(self.staircase.standing_G)
+        if len(places):
+            self._play(Kind.BACK, through(self.staircase, places, BACK_SPEED), 1.0)
+        return bool(len(places))
+
+    def take_up(self) -> None:
+        """The machine is back where the program was set aside: it is what is played again, at rest."""
+        aside = self.aside
+        assert aside is not None
+        self.feeder.arm()
+        self.feeder.making = aside.going_on(self.feeder.next_tick)
+        self.feeds.base = aside.base
+        self.staircase, self._course, self.aside = aside.staircase, aside.course, None
+        self.kind = Kind.PROGRAM
+
+    def leave(self) -> None:
+        """What was set aside is not gone on with."""
+        if self.aside is not None:
+            self.aside.course.close()
+            self.aside = None
+
+    def typed(self, text: str) -> bool:
         """Prove a short text, then begin it; whether anything is to move.
 
         Refused text leaves the machine as it was. Raises ProgramError, MotionError.
         """
-        course = self._proven(self.staircase, [text.encode()])
+        self.set_aside()
+        course = proven(self.staircase, text)
         if not course.moves():
             return False
-        self._play(kind, course, 1.0)
+        self._play(Kind.TYPED, course, 1.0)
         return True
 
     def step(self, distance: Array) -> bool:
         """Begin one straight move by (3,) m, modes staying as they are. Raises MotionError."""
-        x, y, z = (distance / MM).tolist()
-        text = f"G21\nG91\nG1 X{x:.6f} Y{y:.6f} Z{z:.6f} F{STEP_SPEED / MM * MINUTE:g}\n"
-        course = self._proven(self.staircase.apart(), [text.encode()])
-        self._play(Kind.TYPED, course, 1.0)
+        self.set_aside()
+        self._play(Kind.TYPED, straight(self.staircase, distance, STEP_SPEED), 1.0)
         return True
+
+    def jog(self, direction: Array, speed: float) -> Problem:
+        """Begin to go straight along (3,) to the nearest limit; which one that is."""
+        self.set_aside()
+        course, limit = furthest(self.staircase, direction, speed)
+        if course is not None:
+            self._play(Kind.JOG, course, 1.0)
+        return limit
 
     def lift(self, heights: Iterable[float]) -> float:
         """Begin to go straight up by the first of these heights, m, that can be done; 0 if none can."""
-        speed = self.profile.limits.speed_max / 2 / MM * MINUTE
+        speed = self.profile.limits.speed_max / 2
         for height in heights:
-            text = f"G91\nG1 Z{height / MM:.6f} F{speed:.3f}\n"
             try:
-                course = self._proven(self.staircase.apart(), [text.encode()])
+                course = straight(self.staircase, np.array([0.0, 0.0, height]), speed)
             except MotionError:
                 continue
             self._play(Kind.LIFT, course, 1.0)
@@ -228,21 +295,6 @@ class Player:
             self.feeds.begin(course, self.feed, self.gain)
         self.changes.begin(rate)
         self.kind, self._course = kind, course
-
-    def _proven(self, machine: Staircase, chunks: list[bytes]) -> Course:
-        """A course of a short text, looked at tick by tick; the machine's modal state goes on."""
-        before = machine.modal
-        commands = list(machine.commands(chunks))
-        try:
-            trial = Course(machine.fork(), Tape(iter(commands)))
-            trial.plan(AHEAD)
-            first, last = machine.tick, trial.staircase.tick
-            if last > first:
-                trial.rows(first, last)
-        except BaseException:
-            machine.restore(before)
-            raise
-        return Course(machine.fork(), Tape(iter(commands)))
 
 
 def _not_homed() -> Problem:

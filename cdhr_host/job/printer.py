@@ -18,6 +18,7 @@ from cdhr_host.drives.clock import Clock
 from cdhr_host.drives.link import MachineLink
 from cdhr_host.errors import CdhrError, JobError, Problem
 from cdhr_host.job.acts import Acts
+from cdhr_host.job.jogging import Jogging
 from cdhr_host.job.player import Observer, Player
 from cdhr_host.job.program import ProgramFile, proven
 from cdhr_host.job.states import QUIET, Word, after
@@ -53,6 +54,7 @@ class Printer:
         self._telling = Telling()
         self._acts = Acts(Player(link), clock, self._telling, self._happened)
         self._typed = Typed(self._acts.player)
+        self._jogging = Jogging(self._acts.player, clock, self._limit_met)
 
     @property
     def profile(self) -> Profile:
@@ -112,7 +114,7 @@ class Printer:
         """Come to rest on the path; where only typed G-code or a jog moves, that ends."""
         with self._lock:
             if self._state in QUIET and self._state is not JobState.HELD:
-                self._ask(self._typed.end)
+                self._ask(self._end_quiet)
                 return
             self._say(Word.HOLD, reason)
         self._ask(self._acts.hold)
@@ -127,6 +129,7 @@ class Printer:
     def abort(self, reason: str = "") -> None:
         """Rest on the path, vent, lift."""
         self._say(Word.ABORT, reason)
+        self._ask(self._end_quiet)
         self._ask(self._acts.abort)
 
     def emergency_stop(self, reason: str = "") -> None:
@@ -163,7 +166,9 @@ class Printer:
         with self._lock:
             if self._state not in QUIET:
                 raise JobError(Problem("state", f"no jogging while the printer is {self._state.value}"))
-        raise JobError(Problem("jog", f"no motion at {speed} m/s: jogging by speed is not there yet"))
+        if speed.shape != (3,) or not np.isfinite(speed).all():
+            raise JobError(Problem("jog", f"a jog needs three finite speeds, not {velocity}"))
+        self._ask(lambda: self._jogging.ask(speed))
 
     def begin(self) -> None:
         """Turn in a thread of its own until ``close``."""
@@ -186,6 +191,7 @@ class Printer:
                 self._asked.popleft()()
             self._acts.turn(self._state)
             self._typed.turn(self._state)
+            self._jogging.turn(self._state)
         except CdhrError as error:
             self._acts.fail(error)
         self._telling.tell(self.status)
@@ -193,7 +199,15 @@ class Printer:
     @property
     def moving(self) -> bool:
         """Whether anything is being played or asked for."""
-        return bool(self._asked) or self._acts.busy or self._typed.busy
+        return bool(self._asked) or self._acts.busy or self._typed.busy or self._jogging.busy
+
+    def _limit_met(self, limit: Problem) -> None:
+        self._telling.add("message", f"the jog ends here: {limit.message}", limit)
+
+    def _end_quiet(self) -> None:
+        """Typed moves and jogs end on their way."""
+        self._typed.end()
+        self._jogging.end()
 
     def _later(self, begin: Callable[[], bool]) -> "Future[Reply]":
         answer: Future[Reply] = Future()

@@ -49,11 +49,11 @@ class Typed:
                 return
             player.over()
             self._answer(self._reply())
-        while self._waiting and self._running is None:
+        while self._waiting and self._running is None and (player.free or state not in QUIET):
             self._begin(*self._waiting.popleft(), state)
 
     def _begin(self, begin: Callable[[], bool], answer: "Future[Reply]", state: JobState) -> None:
-        if state not in QUIET or self._player.busy:
+        if state not in QUIET:
             problem = Problem("state", f"no typed moves while the printer is {state.value}")
             answer.set_result(Reply(False, (f"error: {problem.message}",), (problem,)))
             return

@@ -87,6 +87,11 @@ class Score:
         """This score up to a part's tick, then the part."""
         return replace(self, parts=(*(each for each in self.parts if each.tick < part.tick), part))
 
+    def alone(self, part: Part) -> "Score":
+        """Nothing but a part, at the same share of the flow."""
+        share = self.gain.after
+        return Score(self.staircase, (part,), Gain(share, share))
+
     def since(self, tick: int) -> "Score":
         """Without what was over before a tick."""
         keep = [k for k, each in enumerate(self.parts) if each.tick <= tick]
