@@ -23,10 +23,10 @@ def test_line_is_the_extruders(profile):
 def test_paste_goes_through_nozzle_and_hose(profile):
     assert bores(profile.extruder) == (
         Channel(5 * MM, 20 * MM),
-        Channel(20 * MM, pytest.approx(500 * MM)),
+        Channel(40 * MM, pytest.approx(150 * MM)),
     )
     law = flow_law(profile.extruder, Clay(model="herschel-bulkley", yield_stress_pa=600.0))
-    assert law.threshold == pytest.approx(4 * 600.0 * (20 / 5 + 500 / 20))
+    assert law.threshold == pytest.approx(4 * 600.0 * (20 / 5 + 150 / 40))
     assert law.flow(law.pressure(np.array([250 * MM3]))) == pytest.approx([250 * MM3])
 
 
