@@ -31,8 +31,6 @@ class Opened:
     """of the drives' ticks"""
     begun: str
     """wall time, ISO 8601"""
-    first_line: int
-    """line printing begins at; 1 for the whole program"""
     goes_on: str
     """the journal this print goes on from; empty for a fresh one"""
 

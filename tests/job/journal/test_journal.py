@@ -21,7 +21,7 @@ from cdhr_host.job.journal import (
 )
 from cdhr_host.job.journal.records import decoded, encoded
 
-OPENED = Opened(1, "/tmp/väse.gcode", "ab" * 32, "paper", "cd" * 32, 0.004, "2026-11-22T06:00:00", 1, "")
+OPENED = Opened(1, "/tmp/väse.gcode", "ab" * 32, "paper", "cd" * 32, 0.004, "2026-11-22T06:00:00", "")
 
 
 def executed(i: int, *, air: bool = True) -> Executed:
