@@ -20,12 +20,16 @@ from cdhr_host.values import Command, Moves
 
 AHEAD: Final = 3.0
 """s of real time planned ahead; a client that pauses is obeyed that late"""
-WAITING_MAX: Final = 64
-"""lines not read yet while the plan needs more"""
+WAITING_MAX: Final = 128
+"""short lines not read yet while the plan needs more"""
 WAITING_FULL: Final = 8
-"""the same while it does not: more than any client has in flight"""
-TOGETHER: Final = 16
+"""the same otherwise: more than any client has in flight"""
+TOGETHER: Final = 128
 """short lines read at once"""
+EVERY: Final = 0.02
+"""s of real time between two readings of short lines, and"""
+SETTLED: Final = 1.0
+"""s of real time settled ahead; the plan is settled further only below that"""
 SHORT: Final = 0.1
 """s a line lasts that counts as short"""
 PATIENCE: Final = 0.1
@@ -65,10 +69,13 @@ class LineStream:
         self._ahead = AHEAD * speed / machine.period
         self._lock = threading.Lock()
         self._waiting: deque[Waiting] = deque()
-        self._room = WAITING_MAX
+        self._settled = SETTLED * speed / machine.period
+        self._settled_to = 0.0
+        self._next = self.began
+        self._room = WAITING_FULL
         self._offered = 0
         self._done = 0
-        self._together = TOGETHER
+        self._together = 1
         self._heard = self.began
         self._finished = False
         self._seen = self.course.first
@@ -108,15 +115,27 @@ class LineStream:
         return not self._finished and self._now() - self._heard < PATIENCE
 
     def read(self, played: float) -> None:
-        """Read lines while less than ``AHEAD`` is planned beyond ``played``, a tick of the plan."""
-        self._room = WAITING_MAX
-        while self.refusal is None and self._waiting:
-            if self.course.staircase.tick - played >= self._ahead:
-                self._room = WAITING_FULL
-                return
+        """Read lines while less than ``AHEAD`` is drawn beyond ``played``, a tick of the plan."""
+        short = self._together > 1
+        if self.refusal is None and self._waiting and self._now() >= self._next:
+            self._next = self._now() + (EVERY if short else 0.0)
+            self._read_until(played + self._ahead)
+        hungry = self.course.ahead - played < self._ahead
+        self._room = WAITING_MAX if hungry and self._together > 1 else WAITING_FULL
+        if self.course.staircase.tick - played < self._settled and not self.course.rests:
+            self._settle()
+
+    def _read_until(self, tick: float) -> None:
+        while self.refusal is None and self._waiting and self.course.ahead < tick:
             with self._lock:
                 batch = [self._waiting.popleft() for _ in range(min(self._together, len(self._waiting)))]
             self._take(batch)
+
+    def _settle(self) -> None:
+        """Settle what was drawn, if there is more than at the last time."""
+        if self.course.ahead > self._settled_to:
+            self._settled_to = self.course.ahead
+            self.course.advance()
 
     def look(self) -> bool:
         """Prove what is planned tick by tick; False when it cannot be moved. Raises nothing for that."""

@@ -130,6 +130,14 @@ class LegPlanner:
         return other
 
     @property
+    def drawn(self) -> float:
+        """s that what is not committed would take at the feed asked for."""
+        if self._segments is None:
+            return 0.0
+        lengths = norms(np.diff(self._segments.points, axis=0))
+        return max(float((lengths / self._segments.feed).sum()), 0.0)
+
+    @property
     def due(self) -> bool:
         """Whether enough has been drawn since the last plan to make another."""
         return self._segments is not None and len(self._segments) - self._planned >= BATCH

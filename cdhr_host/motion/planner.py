@@ -70,6 +70,11 @@ class Planner:
         """Stretches that a further command settles."""
         yield from self._take(command)
 
+    @property
+    def drawn(self) -> float:
+        """s, roughly, of the current leg that are not settled yet."""
+        return self._leg.drawn
+
     def advance(self) -> Iterator[Stretch]:
         """What is settled of the current leg, however little was drawn since the last look."""
         leg = self._leg.plan(closes=False)

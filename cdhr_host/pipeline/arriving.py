@@ -53,21 +53,31 @@ class Arriving(Course):
         return self._rests and self._arrived.at(self._at) is None
 
     def add(self, commands: Sequence[Command]) -> None:
-        """Further commands, planned as far as they settle it."""
+        """Further commands."""
         self._arrived.add(commands)
-        self._settle()
+        self._draw()
+
+    def advance(self) -> None:
+        """Plan as far as the commands so far settle it; costly when called for every one of them."""
+        self._placing(self._place(self.staircase.advanced()))
+
+    @property
+    def ahead(self) -> float:
+        """Tick up to which there is something to play, roughly, settled or not."""
+        return self.staircase.tick + self.staircase.drawn / self.staircase.period
 
     def plan(self, until: int) -> None:
         """Plan on up to a tick; where commands run out before it, up to rest."""
-        self._settle()
+        self._draw()
+        if not self._rests and self.staircase.tick <= until:
+            self.advance()
         if not self._rests and self.staircase.tick <= until:
             self._placing(self._place(self.staircase.closed(ends=False)))
             self.stops.append(Stop(self.staircase.tick, None, waits=True))
             self._rests = True
         self._arrived.forget(min(self._at, self.oldest))
 
-    def _settle(self) -> None:
-        before = self._at
+    def _draw(self) -> None:
         while (command := self._arrived.at(self._at)) is not None:
             if not self._opened:
                 self._placing(self._place(self.staircase.opened()))
@@ -78,8 +88,6 @@ class Arriving(Course):
             self._at += 1
             if not isinstance(command, Notice | Blend | ExactStop):
                 self._rests = isinstance(command, Pause)
-        if self._at > before:
-            self._placing(self._place(self.staircase.advanced()))
 
     @staticmethod
     def _placing(steps: Iterator[object]) -> None:

@@ -111,6 +111,11 @@ class Staircase:
             yield self._timeline.rest(self._planner.standing)
             self._airless_since = self.tick
 
+    @property
+    def drawn(self) -> float:
+        """s, roughly, that are drawn and not settled yet."""
+        return self._planner.drawn
+
     def advanced(self) -> Iterator[Timed]:
         """Stretches that all commands so far settle, without waiting for more of them."""
         for stretch in self._planner.advance():

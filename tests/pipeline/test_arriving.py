@@ -33,6 +33,7 @@ def test_lines_that_come_in_time_move_as_the_whole_file(batch: int) -> None:
     lines = RING.splitlines(keepends=True)
     for first in range(0, len(lines), batch):
         course.add(list(machine.commands(["".join(lines[first : first + batch]).encode()])))
+        course.advance()
     found, expected = played(course), whole(RING)
     assert len(found) == pytest.approx(len(expected), abs=len(expected) * 0.02)
     assert found[-1] == pytest.approx(expected[-1], abs=1e-9)
@@ -65,6 +66,7 @@ def test_what_has_come_is_planned_without_rest_as_far_as_it_settles() -> None:
     machine = Staircase(PROFILE)
     course = Arriving(machine.fork())
     course.add(list(machine.commands([b"G1 X100 F3000\nG1 X100 Y100\nG1 X0\n"])))
+    course.advance()
     assert course.stop() is None
     assert 0 < course.staircase.tick * PROFILE.drives.period < 300 / 50
 
