@@ -185,6 +185,11 @@ class Surface(Protocol):
         """The machine."""
         ...
 
+    @property
+    def state(self) -> JobState:
+        """Where the job is now; costs nothing."""
+        ...
+
     def status(self) -> Status:
         """As of now; cheap."""
         ...

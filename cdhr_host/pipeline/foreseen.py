@@ -9,6 +9,7 @@ from cdhr_host.errors import Problem
 from cdhr_host.motion.arc import chords
 from cdhr_host.motion.curves import points_on
 from cdhr_host.motion.smooth_path import norms
+from cdhr_host.pipeline.audit import on_bed
 from cdhr_host.pipeline.clearing import Clearing
 from cdhr_host.pipeline.staircase import Staircase
 from cdhr_host.pipeline.survey import SPACING
@@ -47,6 +48,9 @@ class Foresight:
         return None
 
     def _at_rest(self, places: Array, line: Ints, clay: Array) -> list[Problem]:
+        if on_bed(places, self._machine.profile).all():
+            kept = _thinned(places)
+            places, line, clay = places[kept], line[kept], clay[kept]
         still, nothing = np.zeros_like(places), np.zeros(len(places))
         tick = np.arange(len(places))
         checked = self._judge.checked(ToolTrack(tick, line, places, still, still, nothing, nothing))
@@ -54,6 +58,14 @@ class Foresight:
             return list(checked.problems)
         rows = replace(checked.setpoints, flow=np.where(clay > 0.0, 1.0, 0.0))
         return self._clearing.problems(rows)
+
+
+def _thinned(places: Array) -> Ints:
+    """Of places that may be far closer, those about SPACING apart, and the last."""
+    way = np.cumsum(norms(np.diff(places, axis=0, prepend=places[:1])))
+    steps = np.floor(way / SPACING)
+    fresh = np.flatnonzero(np.diff(steps, prepend=-1.0) > 0.0)
+    return np.unique(np.append(fresh, len(places) - 1))
 
 
 def _spaced(corners: Array, line: Ints, clay: Array) -> tuple[Array, Ints, Array]:

@@ -63,6 +63,8 @@ class Host:
         self._happened: list[Happened] = []
         self._changed = asyncio.Event()
         self._problems: list[Problem] = []
+        self._turned = 0
+        """changes of state that were told"""
         self._starting: asyncio.Task[None] | None = None
         self._silence: Callable[[], None] = lambda: None
 
@@ -83,6 +85,11 @@ class Host:
             self._starting.cancel()
             with suppress(asyncio.CancelledError, JobError):
                 await self._starting
+
+    @property
+    def state(self) -> JobState:
+        """The job now."""
+        return self.surface.state
 
     def status(self) -> Status:
         """The machine now."""
@@ -136,12 +143,14 @@ class Host:
         if self._starting is not None and not self._starting.done():
             raise JobError(Problem("state", "another program is being proven", hint="wait, or cancel it"))
         self._problems.clear()
+        told = self._turned + 2
         self.surface.load(path, name=self.folder.entry(name).name)
-        self._starting = asyncio.create_task(self._start(name))
+        self._starting = asyncio.create_task(self._start(name, told))
         await asyncio.shield(self._starting)
 
-    async def _start(self, name: str) -> None:
-        status = await self.until(lambda state: state is not JobState.PROVING)
+    async def _start(self, name: str, told: int) -> None:
+        """Once the proof's end has been told: what is wrong is told before it."""
+        status = await self.until(lambda state: state is not JobState.PROVING and self._turned >= told)
         if status.state is not JobState.READY:
             problems = tuple(self._problems) or (Problem("program", status.message or f"{name} is refused"),)
             raise JobError(problems)
@@ -152,14 +161,15 @@ class Host:
 
     async def until(self, reached: Callable[[JobState], bool]) -> Status:
         """Wait for a state."""
-        while not reached((status := self.status()).state):
+        while not reached(self.state):
             self._changed.clear()
             with suppress(asyncio.TimeoutError):
                 await asyncio.wait_for(self._changed.wait(), LOOK)
-        return status
+        return self.status()
 
     def _event(self, event: Event) -> None:
         self._changed.set()
+        self._turned += event.kind == "state"
         if event.problem is not None:
             self._problems.append(event.problem)
             del self._problems[:-100]

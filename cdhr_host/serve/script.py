@@ -157,9 +157,9 @@ class Executor:
         self._host.surface.resume()
 
     async def _cancel(self, _: str) -> None:
-        if self._host.status().state in ACTIVE:
+        if self._host.state in ACTIVE:
             self._host.surface.abort("cancelled by a client")
-        elif self._host.status().state in {JobState.READY, JobState.DONE, JobState.STOPPED}:
+        elif self._host.state in {JobState.READY, JobState.DONE, JobState.STOPPED}:
             self._host.surface.unload()
 
     async def _stop(self, _: str) -> None:
@@ -173,7 +173,7 @@ class Executor:
 
     async def _print(self, line: str) -> None:
         name = _parameters(line).get("FILENAME", "")
-        if self._host.status().state in PAUSED:
+        if self._host.state in PAUSED:
             raise _refused("a print is held", "RESUME or CANCEL_PRINT first")
         try:
             await asyncio.wait_for(self._host.print_file(name.removeprefix("/")), PATIENCE)
@@ -204,7 +204,7 @@ class Executor:
         self._host.modes = saved.modes
 
     async def _acknowledge(self, _: str) -> None:
-        if self._host.status().state is JobState.FAULT:
+        if self._host.state is JobState.FAULT:
             self._host.surface.acknowledge()
 
     async def _respond(self, line: str) -> None:

@@ -122,7 +122,7 @@ class Server:
 
     async def _come_to_rest(self) -> None:
         """A print that is under way holds on its path."""
-        self.interrupted = self.host.status().state in ACTIVE
+        self.interrupted = self.host.state in ACTIVE
         try:
             if self.interrupted:
                 self.host.surface.hold("the server ends")

@@ -48,11 +48,11 @@ class Streams:
             return
         left = feed.pending
         self.finish(owner)
-        if left and self._host.status().state is JobState.PRINTING:
+        if left and self._host.state is JobState.PRINTING:
             self._host.surface.hold(f"{name} has gone with {left} lines to print")
 
     def _of(self, owner: object) -> LineFeed | None:
-        if self._feed is not None and self._host.status().state in OVER:
+        if self._feed is not None and self._host.state in OVER:
             self._feed = self._owner = None
         return self._feed if self._owner is owner else None
 

@@ -81,6 +81,10 @@ class ScriptedSurface:
         self._path: Path | None = None
         self._name = ""
 
+    @property
+    def state(self) -> JobState:
+        return self._status.state
+
     def status(self) -> Status:
         return self._status
 

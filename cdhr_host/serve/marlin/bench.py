@@ -42,7 +42,7 @@ class Bench:
 
     def state(self) -> JobState:
         """The job now."""
-        return self.status().state
+        return self.host.state
 
     def said(self) -> list[str]:
         """Messages since the last look."""

@@ -85,10 +85,10 @@ class Reports:
 
     def changes(self) -> list[str]:
         """What the host tells its client when the job's state has changed since the last look."""
-        before, status = self._state, self._bench.status()
-        self._state = after = status.state
+        before, after = self._state, self._bench.state()
         if before is after:
             return []
+        self._state, status = after, self._bench.status()
         if after in PAUSED and before not in PAUSED:
             return [*_paused(status), *(_prompt(status) if self.prompts else ())]
         if before in PAUSED and after in ACTIVE - PAUSED:

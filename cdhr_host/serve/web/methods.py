@@ -222,7 +222,7 @@ class Methods:
 
 def host_busy(host: Host) -> bool:
     """Whether a program is under way or being proven."""
-    return host.status().state.value not in {"idle", "ready", "done", "stopped", "fault"}
+    return host.state.value not in {"idle", "ready", "done", "stopped", "fault"}
 
 
 def gcodes_name(name: str) -> str:

@@ -124,7 +124,7 @@ class OctoPrint:
             progress = self._host.status().progress
             await self._executor.run(f'SDCARD_PRINT_FILE FILENAME="{progress.file if progress else ""}"')
         elif command == "pause":
-            held = self._host.status().state in PAUSED
+            held = self._host.state in PAUSED
             resumes = action == "resume" or (action == "toggle" and held)
             await self._executor.run("RESUME" if resumes else "PAUSE")
         elif command in JOBS:
