@@ -7,6 +7,7 @@ import numpy as np
 
 from cdhr_host.mechanism import POLICIES, PolicyName, Printable, Workspace, printable
 from cdhr_host.profile import Profile
+from cdhr_host.report.files import put
 from cdhr_host.samples import LAWS
 from cdhr_host.units import MM
 from cdhr_host.values import Array
@@ -87,4 +88,5 @@ def draw(found: Reach, title: str, path: Path) -> None:
     )
     axes.legend()
     axes.grid(alpha=0.3)
-    figure.savefig(path, dpi=120)
+    with put(path) as part:
+        figure.savefig(part, dpi=120)
