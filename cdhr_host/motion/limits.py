@@ -205,8 +205,10 @@ def cells(
     cap = np.minimum(np.minimum.reduceat(pieces.feed, heads), limits.speed)
     bend = np.maximum.reduceat(pieces.bend, heads)
     change = np.maximum.reduceat(pieces.change, heads)
+    left = np.minimum.reduceat(pieces.share, heads)
+    cap = np.minimum(cap, _pushed_speed(bend, left, limits))
     speed, spent = _budget(cap, bend, change, roomy[heads], limits)
-    share = np.minimum(spent, np.minimum.reduceat(pieces.share, heads))
+    share = np.minimum(spent, left)
     settled = pieces.start[heads[-1]] if pieces.bent[-1] else span[1]
     merged = _merge_heads(pieces.start[heads] + passed, speed, share)
     length = np.add.reduceat(np.add.reduceat(pieces.length, heads), merged)
@@ -262,6 +264,18 @@ def _budget(
         speed, share = np.where(good, reached, speed), np.where(good, candidate, share)
         undecided &= ~good
     return speed, share
+
+
+def _pushed_speed(bend: Array, share: Array, limits: MotionLimits) -> Array:
+    """(K,) m/s: greatest s' in a bend whose slowing down the air can follow with its ``share``.
+
+    A corner turned by theta is cut, so that |q'| falls to cos(theta/2) in its middle: along the path
+    q'' is up to |q''| sin(theta/2). A corner with the usual kernel has sin(theta/2) = |q''| h/2, a
+    wider kernel of its own (h = 2 h0/theta) about the root of |q''| h0/2, which is the greater one.
+    """
+    with np.errstate(divide="ignore"):
+        sine = np.sqrt(np.minimum(1.0, bend * limits.half_width / 2.0))
+        return np.asarray(np.sqrt(share * limits.acceleration / (bend * sine)))
 
 
 def _bend_speed(bend: Array, change: Array, share: float, limits: MotionLimits) -> Array:

@@ -33,6 +33,8 @@ LEAST: Final = 0.15
 """change of the rate that every ramp has room for: what landing on a whole tick needs"""
 SLACK: Final = 1.005
 """of the jerk, measured over three ticks, that counts as keeping its limit"""
+EASED: Final = 1.4
+"""times the shortest ramp the air can follow where the plan's own flow is constant"""
 ROUNDING: Final = 1e-9
 HISTORY: Final = 3
 """rows before a change that its jerk still sees"""
@@ -118,7 +120,7 @@ def choices(
     """Paces from tick ``first`` on that keep the limits, soonest settled first."""
     period, profile = ahead.profile.drives.period, ahead.profile
     least = bound(profile, *ahead.speeds, max(change, LEAST)) / period
-    soonest = RATE_SLOPE * change * ahead.pushing / period
+    soonest = EASED * RATE_SLOPE * change * ahead.pushing / period
     begins = sorted({round(share * turning_time(profile) / period) for share in waits})
     lasting = sorted({max(SHORTEST, math.ceil(max(stretch * least, soonest))) for stretch in STRETCHES})
     pairs = sorted(((wait, last) for wait in begins for last in lasting), key=lambda pair: (sum(pair), pair))
