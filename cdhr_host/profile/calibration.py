@@ -37,14 +37,14 @@ class Calibration(Section):
 
     pulley_shift_mm: Annotated[
         Shifts, Field(description="pulley centres of cables 1-6 away from their drawn places, x, y, z in W")
-    ] = []
+    ] = []  # noqa: RUF012 - pydantic copies defaults
     attachment_shift_mm: Annotated[
         Shifts, Field(description="attachments 1-6 on their platforms away from their drawn places, x, y, z")
-    ] = []
+    ] = []  # noqa: RUF012 - pydantic copies defaults
     reference_shift_mm: Annotated[
         Shift,
         Field(description="lower platform at the reference pose, sliders at 0, away from its drawn place"),
-    ] = []
+    ] = []  # noqa: RUF012 - pydantic copies defaults
 
     def pulleys(self) -> Array:
         """(6, 3) m."""
