@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cdhr_host.cli.interrupt import StopRequest
+from cdhr_host.cli.keys import Keys
 from cdhr_host.cli.progress import Progress
 from cdhr_host.cli.refusals import say, writing
 from cdhr_host.cli.source import Source
@@ -18,7 +19,10 @@ if TYPE_CHECKING:
     from cdhr_host.drives import Clock, MachineLink
     from cdhr_host.job import RunSummary
     from cdhr_host.job.closed_loop import Loop
-    from cdhr_host.pipeline import Checked, Proof
+    from cdhr_host.job.printer import Printer
+    from cdhr_host.job.program import Program
+    from cdhr_host.job.surface import Event
+    from cdhr_host.pipeline import Checked
     from cdhr_host.profile import Profile
     from cdhr_host.report.log import RunLog
     from cdhr_host.values import Command, Feedback, Pause, Setpoints
@@ -33,7 +37,7 @@ class Run:
 
     source: Source
     machine: "Profile"
-    proof: "Proof"
+    program: "Program"
     link: "MachineLink"
     clock: "Clock"
     stop: StopRequest
@@ -69,9 +73,6 @@ class Stretches:
 
 def printed(run: Run, log: Path | None) -> "RunSummary":
     """Print the file; what was done stays in the log, however it ends."""
-    from cdhr_host.pipeline import Staircase
-    from cdhr_host.report.run import joined
-
     run.source.still_the_same()
     with ExitStack() as stack:
         out = stack.enter_context(_kept(log)) if log else None
@@ -82,40 +83,97 @@ def printed(run: Run, log: Path | None) -> "RunSummary":
             if out is not None:
                 out.add_run(rows, feedback)
 
-        program = Stretches(Staircase(run.machine).walk(run.source.chunks()))
-        return joined(list(_stretches(run, program, done)))
+        if run.loop is not None:
+            return _in_a_loop(run, run.loop, done)
+        return _by_printer(run, done, stack.enter_context(Keys()))
 
 
-def _stretches(
-    run: Run, program: Stretches, done: "Callable[[Setpoints, Feedback], None]"
-) -> "Iterator[RunSummary]":
-    """Run stretch after stretch, each from where the one before it came to rest."""
+def _by_printer(run: Run, done: "Callable[[Setpoints, Feedback], None]", keys: Keys) -> "RunSummary":
+    """Have a printer do it, in this thread; raises what brought it to a fault, at rest."""
+    from cdhr_host.job import Tally
+    from cdhr_host.job.printer import Printer
+    from cdhr_host.job.surface import JobState
+
+    printer, tally = Printer(run.link, run.clock), Tally()
+    printer.observe(tally.add)
+    printer.observe(done)
+    printer.listen(_told)
+    try:
+        printer.adopt(run.program)
+        printer.start()
+        while printer.state is not JobState.DONE and not _ended(printer, run, keys):
+            printer.turn()
+            printer.wait()
+    finally:
+        printer.close()
+    if printer.fault is not None:
+        raise printer.fault
+    interrupted = printer.state is not JobState.DONE
+    return tally.summary(run.machine.drives.period, interrupted=interrupted, timing=run.link.timing())
+
+
+def _ended(printer: "Printer", run: Run, keys: Keys) -> bool:
+    """Whether nothing more is to be printed; asks for a hold, or goes on from one, where that is wished."""
+    from cdhr_host.job.states import Word, can
+    from cdhr_host.job.surface import JobState
+
+    if printer.state is JobState.FAULT:
+        return True
+    if run.stop():
+        if can(printer.state, Word.HOLD) and printer.state is not JobState.HELD:
+            printer.hold("stopped on request")
+        return printer.state is JobState.HELD
+    keys.obey(printer)
+    if printer.pause is None or printer.state is not JobState.HELD:
+        return False
+    return _ended_by_pause(printer, run)
+
+
+def _ended_by_pause(printer: "Printer", run: Run) -> bool:
+    """Go on from a pause, when the operator says so; True if that is never."""
+
+    def stopped() -> bool:
+        printer.turn()
+        return run.stop()
+
+    assert printer.pause is not None
+    if run.waits and not _goes_on(printer.pause, stopped):
+        return True
+    printer.resume()
+    return False
+
+
+def _told(event: "Event") -> None:
+    if event.kind in {"message", "override"}:
+        say(f"cdhr: {event.text}")
+
+
+def _in_a_loop(run: Run, loop: "Loop", done: "Callable[[Setpoints, Feedback], None]") -> "RunSummary":
+    """Stretch after stretch through a simulated control loop, each from where the last came to rest."""
     import numpy as np
 
     from cdhr_host.job import stream
     from cdhr_host.job.closed_loop import closed_loop
+    from cdhr_host.pipeline import Staircase
+    from cdhr_host.report.run import joined
 
-    start = np.zeros(6)
+    program, start = Stretches(Staircase(run.machine).walk(run.source.chunks())), [np.zeros(6)]
 
     def note(rows: "Setpoints", feedback: "Feedback") -> None:
-        nonlocal start
-        start = rows.slider[-1]
+        start[0] = rows.slider[-1]
         done(rows, feedback)
 
-    while True:
-        rows = program.following()
-        if run.loop is not None:
-            rows = closed_loop(rows, run.loop, run.machine, say)
-        summary = stream(rows, run.link, run.clock, start=start, on_rows=note, should_stop=run.stop)
-        over = summary.interrupted or program.pause is None
-        if not over and program.pause is not None and run.waits and not _goes_on(program.pause, run.stop):
-            over, summary = True, replace(summary, interrupted=True)
-        yield summary
-        if over:
-            return
+    summaries: list[RunSummary] = []
+    while not summaries or not (summaries[-1].interrupted or program.pause is None):
+        rows = closed_loop(program.following(), loop, run.machine, say)
+        summary = stream(rows, run.link, run.clock, start=start[0], on_rows=note, should_stop=run.stop)
+        if program.pause is not None and run.waits and not summary.interrupted:
+            summary = replace(summary, interrupted=not _goes_on(program.pause, run.stop))
+        summaries.append(summary)
+    return joined(summaries)
 
 
-def _goes_on(pause: "Pause", stop: StopRequest) -> bool:
+def _goes_on(pause: "Pause", stop: "Callable[[], bool]") -> bool:
     """Wait for the operator: True for Enter, False for a stop request or the end of input."""
     message = f": {pause.message}" if pause.message else ""
     say(f"paused at line {pause.line}{message}\nEnter goes on, Ctrl-C ends")
@@ -139,8 +197,8 @@ def _kept(log: Path) -> "Iterator[RunLog]":
 
 def _shown(run: Run, progress: Progress) -> "Callable[[Setpoints], None]":
     """A function that shows where a run is, from the rows just executed."""
-    layer_lines = [line for line, _ in run.proof.layers]
-    duration = run.proof.duration
+    layer_lines = [line for line, _ in run.program.proof.layers]
+    duration = run.program.proof.duration
 
     def show(rows: "Setpoints") -> None:
         t, line = float(rows.t[-1]), int(rows.line[-1])

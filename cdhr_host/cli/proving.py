@@ -38,7 +38,19 @@ def proven(
     """
     from cdhr_host.pipeline import prove
 
-    with _log(log, machine, rate, source.name) as (out, takes), Progress("checking") as progress:
+    with _log(log, machine, rate, source.name) as (out, takes), checking(source, see) as watch:
+        proof = prove(source.chunks(), machine, rate_hz=rate, watch=watch, **takes)
+        if out is not None and proof.ok:
+            out.keep()
+    return proof
+
+
+@contextmanager
+def checking(
+    source: Source, see: "Callable[[Checked], None] | None" = None
+) -> "Iterator[Callable[[Checked], None]]":
+    """Progress of a proof: a function to be shown every block; ``see`` is shown it too."""
+    with Progress("checking") as progress:
 
         def watch(checked: "Checked") -> None:
             if see is not None:
@@ -46,10 +58,7 @@ def proven(
             if len(block := checked.setpoints):
                 progress.show(source.fraction, f"line {block.line[-1]}  {clock_text(block.t[-1])} of motion")
 
-        proof = prove(source.chunks(), machine, rate_hz=rate, watch=watch, **takes)
-        if out is not None and proof.ok:
-            out.keep()
-    return proof
+        yield watch
 
 
 @contextmanager

@@ -11,12 +11,13 @@ from cdhr_host.cli.interrupt import StopRequest
 from cdhr_host.cli.machine import SIMULATED, check_log, open_machine, opened
 from cdhr_host.cli.options import DrivesUrl, Json, LogPath, MaterialName, ProfileName, Program, examples
 from cdhr_host.cli.printing import Run, printed
-from cdhr_host.cli.proving import proven, tell_problems
+from cdhr_host.cli.proving import checking, tell_problems
 from cdhr_host.cli.refusals import INTERRUPTED, Refusal, about, emit
 from cdhr_host.cli.source import Source
 
 if TYPE_CHECKING:
     from cdhr_host.job.closed_loop import Loop
+    from cdhr_host.job.program import Program
     from cdhr_host.pipeline import Proof
     from cdhr_host.profile import Profile
 
@@ -25,7 +26,8 @@ EXAMPLES = examples(
     "cdhr stream vase.gcode.gz --profile paper-wide --log run.parquet",
     "cdhr stream part.gcode --control outer --speed 20",
     "cdhr stream part.gcode --json",
-    more="Ctrl-C stops on the path and closes the air (exit code 130).",
+    more="In a terminal space holds and goes on, + and - change the feed by 10 %. "
+    "Ctrl-C stops on the path and closes the air (exit code 130).",
 )
 
 
@@ -72,13 +74,14 @@ def stream(
     link, clock = opened(drives, machine, speed)
     try:
         with about(source.name):
-            proof = proven(source, machine)
+            program = _program(source, machine)
+            proof = program.proof
             tell_problems(proof, source)
             if not proof.ok:
                 raise typer.Exit(MotionError.exit_code)
             _agreed(proof, drives, yes)
             with StopRequest() as stop:
-                run = Run(source, machine, proof, link, clock, stop, waits=not yes, loop=loop)
+                run = Run(source, machine, program, link, clock, stop, waits=not yes, loop=loop)
                 summary = printed(run, log)
     finally:
         link.close()
@@ -88,6 +91,16 @@ def stream(
         emit("\n".join(run_lines(summary, proof, source.name)))
     if summary.interrupted:
         raise typer.Exit(INTERRUPTED)
+
+
+def _program(source: Source, machine: "Profile") -> "Program":
+    """The file, proven."""
+    from pathlib import Path
+
+    from cdhr_host.job.program import ProgramFile, proven
+
+    with checking(source) as watch:
+        return proven(ProgramFile(Path(source.name)), machine, watch=watch, chunks=source.chunks())
 
 
 def _loop(control: Control, machine: "Profile", drives: str) -> "Loop | None":

@@ -30,6 +30,7 @@ class Acts:
     def __init__(self, player: Player, clock: Clock, telling: Telling, happened: Happen) -> None:
         self.player = player
         self.message = ""
+        self.fault: CdhrError | None = None
         self._clock = clock
         self._telling = telling
         self._happened = happened
@@ -86,6 +87,10 @@ class Acts:
             return
         for warning in program.proof.warnings:
             self._telling.add("message", warning.message, warning)
+        self.adopt(program)
+
+    def adopt(self, program: Program) -> None:
+        """A program that can be printed."""
         self._program = program
         self._count = Count(program, self._clock.now())
         self._happened(Word.PROVEN, f"{program.file.name} can be printed")
@@ -180,6 +185,7 @@ class Acts:
 
     def fail(self, error: CdhrError) -> None:
         """A fault: the machine comes to rest by its link, and stands until somebody has seen to it."""
+        self.fault = error
         for problem in error.problems:
             self._telling.add("problem", problem.message, problem)
         self._happened(Word.FAIL, error.problems[0].message)
@@ -191,17 +197,21 @@ class Acts:
         """Bring the machine to rest for good."""
         with suppress(CdhrError):
             self.player.link.stop()
+        self._collect_rest()
         while self.player.link.state is LinkState.STOPPING:
             self._clock.wait_until(self._clock.now() + self.player.profile.drives.period)
-            with suppress(CdhrError):
-                self.player.collect()
+            self._collect_rest()
+
+    def _collect_rest(self) -> None:
+        """What a machine that is being stopped has executed; a further fault changes nothing."""
+        with suppress(CdhrError):
+            self.player.collect()
 
     def turn(self, state: JobState) -> None:
         """Feed, collect, and what follows from it."""
         if state is JobState.FAULT:
             self._lines.end()
-            with suppress(CdhrError):
-                self.player.collect()
+            self._collect_rest()
             return
         self._lines.turn(state)
         rest = self.player.turn()

@@ -21,7 +21,7 @@ from cdhr_host.pipeline.course import Course, Stop
 from cdhr_host.pipeline.score import Gain
 from cdhr_host.pipeline.tape import Tape
 from cdhr_host.units import MM, MM3
-from cdhr_host.values import Array, Feedback, Setpoints
+from cdhr_host.values import Array, Feedback, Pause, Setpoints
 
 STEP_SPEED: Final = 25 * MM
 """m/s of a single step"""
@@ -99,6 +99,12 @@ class Player:
         if np.abs(slider).max() > REFERENCE:
             self.feeder.slider = slider
             self.staircase.stand_at(*self.staircase.rig.standing(slider))
+
+    @property
+    def pause(self) -> Pause | None:
+        """The program's pause at which it stands, if it does."""
+        stop = self.feeder.stop if self.kind is Kind.PROGRAM and self.feeder.at_rest else None
+        return stop.pause if stop is not None else None
 
     def refuse_start(self) -> None:
         """Raises JobError: a program begins at the reference pose only."""

@@ -20,17 +20,18 @@ from cdhr_host.errors import CdhrError, JobError, Problem
 from cdhr_host.job.acts import Acts
 from cdhr_host.job.jogging import Jogging
 from cdhr_host.job.player import Observer, Player
-from cdhr_host.job.program import ProgramFile, proven
+from cdhr_host.job.program import Program, ProgramFile, proven
 from cdhr_host.job.states import QUIET, Word, after
 from cdhr_host.job.surface import JobState, LineFeed, Listener, Reply, Status
 from cdhr_host.job.telling import Telling
 from cdhr_host.job.typed import Typed
 from cdhr_host.job.waiting import wait_a_little
 from cdhr_host.profile import Profile
-from cdhr_host.values import Array
+from cdhr_host.values import Array, Pause
 
 LEAST, MOST = 0.01, 3.0
 """of an override"""
+BUG = "please report this as a bug, with the program"
 IDLE = 0.02
 """s of real time between two looks when nothing moves"""
 
@@ -85,6 +86,13 @@ class Printer:
         self._acts.forget()
         future = self._executor.submit(proven, file, self.profile)
         future.add_done_callback(lambda found: self._ask(partial(self._acts.proven, found)))
+
+    def adopt(self, program: Program) -> None:
+        """A program that is proven already. Raises JobError where the machine cannot do it."""
+        if not program.proof.ok:
+            raise JobError(program.proof.problems, total=program.proof.total_problems)
+        self._say(Word.LOAD)
+        self._acts.adopt(program)
 
     def unload(self) -> None:
         """Forget the program, and the clay: the part is taken off."""
@@ -214,14 +222,31 @@ class Printer:
         self._ask(lambda: self._typed.add(begin, answer))
         return answer
 
+    def wait(self) -> None:
+        """Let a little time pass before the next turn."""
+        if self.moving:
+            wait_a_little(self._acts.player.link, self._clock)
+        else:
+            self._wake.wait(IDLE)
+            self._wake.clear()
+
+    @property
+    def fault(self) -> CdhrError | None:
+        """What brought it to FAULT, if the machine did."""
+        return self._acts.fault
+
+    @property
+    def pause(self) -> Pause | None:
+        """The program's pause it stands at, if it does."""
+        return self._acts.player.pause
+
     def _run(self) -> None:
         while not self._ending.is_set():
-            self.turn()
-            if self.moving:
-                wait_a_little(self._acts.player.link, self._clock)
-            else:
-                self._wake.wait(IDLE)
-                self._wake.clear()
+            try:
+                self.turn()
+            except Exception as error:
+                self._acts.fail(JobError(Problem("bug", f"{type(error).__name__}: {error}", hint=BUG)))
+            self.wait()
 
     def _say(self, word: Word, message: str = "") -> None:
         """A word from outside, or of the machine: the state it leads to, or JobError."""

@@ -73,13 +73,19 @@ class Program:
         return bisect_right(self.proof.layers, (line, 1 << 62))
 
 
-def proven(file: ProgramFile, profile: Profile, watch: Callable[[Checked], None] | None = None) -> Program:
+def proven(
+    file: ProgramFile,
+    profile: Profile,
+    *,
+    watch: Callable[[Checked], None] | None = None,
+    chunks: Iterator[bytes] | None = None,
+) -> Program:
     """Walk the whole file. Raises ProgramError for text that is not understood.
 
-    What the machine cannot do is in the proof.
+    What the machine cannot do is in the proof. ``chunks`` is the text where it is read already.
     """
     index = _Index()
-    proof = prove(index.noting(file.chunks()), profile, watch=watch)
+    proof = prove(index.noting(chunks or file.chunks()), profile, watch=watch)
     return Program(file, proof, index.size, np.array(index.places, dtype=np.int64))
 
 

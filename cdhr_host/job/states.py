@@ -94,6 +94,11 @@ def after(state: S, word: Word) -> S:
     )
 
 
+def can(state: S, word: Word) -> bool:
+    """Whether a word is allowed."""
+    return (state, word) in TABLE
+
+
 def diagram() -> str:
     """The table as a mermaid state diagram; words that lead to the same state share an arrow."""
     arrows: dict[tuple[S, S], list[str]] = {}
