@@ -53,7 +53,8 @@ def clay(
         Path | None, typer.Option(metavar="GCODE", help="Write a program to measure from, and its table.")
     ] = None,
     by: Annotated[
-        Literal["cups", "lines"], typer.Option(help="What the pattern is measured with: scale or calliper.")
+        Literal["cups", "lines", "steps"],
+        typer.Option(help="What the pattern is for: cups on a scale, lines, or steps over a scale."),
     ] = "cups",
     pressures: Annotated[
         str | None, typer.Option(metavar="KPA,KPA,...", help="Pressures of the pattern; eight when left out.")

@@ -1,21 +1,23 @@
 """The program a clay is measured with, and the table to fill in."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from cdhr_host import samples
 from cdhr_host.cli.refusals import Refusal, check_file, say, writing
 from cdhr_host.extrusion import flow_law
 from cdhr_host.extrusion.identify import bead_section
+from cdhr_host.extrusion.model import is_led
 from cdhr_host.samples.clay import LINE_LENGTH, Bead, Push
 from cdhr_host.units import KPA, MM, MM3
+from cdhr_host.values import Array
 
 if TYPE_CHECKING:
     from cdhr_host.profile import Profile
 
-COUNT: Final = 8
 CUP: Final = 8e-6
 """m³ of clay wanted in a cup"""
 SHORTEST: Final = 10.0
@@ -25,49 +27,68 @@ MOST: Final = 0.8
 """greatest pressure over the air's: some is kept for the changes of flow"""
 SLOWEST: Final = 2.0 * MM
 """m/s of a line"""
+SPREAD: Final = (np.arange(1, 9) / 8) ** 2
+STEPS_SPREAD: Final = np.array([0.04, 0.25, 1.0])
+"""flows of the pressures, over the greatest"""
+STEP: Final = 2.0
+REST: Final = 1.0
+"""s with the air open and shut"""
+REPEATS: Final = 4
+
+Pattern = tuple[Iterator[str], list[str], str]
+"""lines of the program, rows of the table, what to do"""
 
 
 def write_pattern(path: Path, machine: "Profile", by: str, pressures: str | None, options: str) -> None:
     """Write the program and, beside it, the table that wants its measurements."""
-    from cdhr_host import samples
-
     check_file(path, [".gcode"], "--pattern")
     table = path.with_suffix(".csv")
     if table.exists():
         hint = "hint: give the pattern another name"
         raise Refusal(f"cdhr: error: {table} exists and may hold your measurements\n{hint}")
-    flows = _flows(machine, pressures)
-    if by == "cups":
-        pushes = [Push(p, q, float(np.clip(round(CUP / q), SHORTEST, LONGEST))) for p, q in flows]
-        lines, rows = samples.cups(pushes, _clay_per_e(machine)), _cup_rows(pushes)
-        todo = "weigh every cup"
-    else:
-        beads = _beads(flows, machine)
-        pushes = [Push(p, q, LINE_LENGTH / bead.speed) for (p, q), bead in zip(flows, beads, strict=True)]
-        lines, rows = samples.lines(pushes, beads, _clay_per_e(machine)), _line_rows(pushes, beads)
-        todo = "measure every line's width in its middle"
+    lines, rows, todo = {"cups": _cups, "lines": _lines, "steps": _steps}[by](machine, pressures)
     head = f"; cdhr calibrate clay {options} --by {by} --pattern {path.name} : {todo}"
     for target, text in ((path, [head, *lines]), (table, rows)):
         with writing(target):
             target.write_text("\n".join([*text, ""]), encoding="ascii", newline="\n")
-    say(f"{path}: print it with cdhr stream {path} {options}, {todo}")
+    log = f" --log {path.stem}.run.csv" if by == "steps" else ""
+    say(f"{path}: print it with cdhr stream {path} {options}{log}, {todo}")
     say(f"{table}: fill in, then cdhr calibrate clay {table} {options}")
 
 
-def _cup_rows(pushes: Sequence[Push]) -> list[str]:
+def _cups(machine: "Profile", pressures: str | None) -> Pattern:
+    flows = _flows(machine, pressures, SPREAD)
+    pushes = [Push(p, q, float(np.clip(round(CUP / q), SHORTEST, LONGEST))) for p, q in flows]
     rows = [f"{push.pressure / KPA:g},,{push.duration:g}" for push in pushes]
-    return ["pressure_kpa,mass_g,time_s", *rows]
+    lines = samples.cups(pushes, _clay_per_e(machine))
+    return lines, ["pressure_kpa,mass_g,time_s", *rows], "weigh every cup"
 
 
-def _line_rows(pushes: Sequence[Push], beads: Sequence[Bead]) -> list[str]:
+def _lines(machine: "Profile", pressures: str | None) -> Pattern:
+    flows = _flows(machine, pressures, SPREAD)
+    beads = _beads(flows, machine)
+    pushes = [Push(p, q, LINE_LENGTH / bead.speed) for (p, q), bead in zip(flows, beads, strict=True)]
     rows = [
         f"{push.pressure / KPA:g},{bead.speed / MM:g},,{bead.height / MM:g}"
         for push, bead in zip(pushes, beads, strict=True)
     ]
-    return ["pressure_kpa,speed_mm_s,width_mm,height_mm", *rows]
+    lines = samples.lines(pushes, beads, _clay_per_e(machine))
+    head = "pressure_kpa,speed_mm_s,width_mm,height_mm"
+    return lines, [head, *rows], "measure every line's width in its middle"
 
 
-def _flows(machine: "Profile", pressures: str | None) -> list[tuple[float, float]]:
+def _steps(machine: "Profile", pressures: str | None) -> Pattern:
+    if is_led(machine):
+        raise Refusal(
+            "cdhr: error: the air of this profile is led, its pressure does not step\n"
+            'hint: write lead = "off" into [extruder] of a copy (cdhr profile show NAME > copy.toml)'
+        )
+    pushes = [Push(p, q, STEP) for p, q in _flows(machine, pressures, STEPS_SPREAD)]
+    lines = samples.steps(pushes, REPEATS, REST, _clay_per_e(machine))
+    return lines, ["t_s,pressure_kpa,mass_g"], "a scale writing what it reads"
+
+
+def _flows(machine: "Profile", pressures: str | None, spread: Array) -> list[tuple[float, float]]:
     """(Pa, m³/s) of every push: as asked, or from little flow to much, closer where there is little."""
     law = flow_law(machine.extruder, machine.clay)
     if pressures is not None:
@@ -80,7 +101,7 @@ def _flows(machine: "Profile", pressures: str | None) -> list[tuple[float, float
                 f"{MOST * machine.extruder.pressure_max / KPA:.0f} kPa\nhint: name pressures with --pressures"
             )
         top = min(top, _section(machine) * machine.limits.speed_max)
-        levels = np.round(law.pressure(top * (np.arange(1, COUNT + 1) / COUNT) ** 2) / KPA, 1) * KPA
+        levels = np.round(law.pressure(top * spread) / KPA, 1) * KPA
     return list(zip(levels.tolist(), law.flow(levels).tolist(), strict=True))
 
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cdhr_host.cli.refusals import Refusal, about, check_file
+from cdhr_host.cli.refusals import Refusal, about, check_file, say
 
 if TYPE_CHECKING:
     from cdhr_host.drives import Clock, MachineLink
@@ -17,7 +17,10 @@ def open_machine(profile: str, material: str | None = None) -> "Profile":
     from cdhr_host.pipeline import open_profile
 
     with about(profile):
-        return open_profile(profile, material)
+        machine = open_profile(profile, material)
+    if machine.clay.example:
+        say(f"{machine.clay.name}: an example, not your clay; cdhr calibrate clay finds yours")
+    return machine
 
 
 def opened(drives: str, machine: "Profile", speed: float) -> "tuple[MachineLink, Clock]":

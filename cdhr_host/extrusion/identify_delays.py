@@ -21,6 +21,8 @@ GRID: Final = 2e-3
 """s between two steps of the sum"""
 LONGEST: Final = 5.0
 """s, greatest dead time and lag that is looked for"""
+MOST_LEVELS: Final = 8
+"""different pressures in one record: each has a gain to be found"""
 OFF: Final = 0.3
 """share by which the steps may differ from the flow curve"""
 NOTHING: Final = 1e-3
@@ -130,6 +132,9 @@ def _check(record: StepRecord, law: PressureFlow) -> None:
     if not (np.any(step > 0.0) and np.any(shuts)):
         wrong = "the air never opens" if not np.any(step > 0.0) else "the air is never shut"
         hint = "record several steps from 0 to a printing pressure and back, a second or two each"
+    elif len(record.levels) > MOST_LEVELS:
+        wrong = f"the air takes {len(record.levels)} different pressures"
+        hint = 'print the steps with lead = "off" in [extruder]: then the command steps, and the clay follows'
     elif opened <= law.threshold:
         wrong = f"{opened / 1e3:.0f} kPa never moves a clay that yields at {law.threshold / 1e3:.0f} kPa"
         hint = "name the right clay with --material, or weigh its flow curve first"

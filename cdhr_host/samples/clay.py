@@ -1,4 +1,4 @@
-"""Programs that show a clay's flow: cups to weigh, or lines to measure, each at one pressure.
+"""Programs that show a clay's flow: cups to weigh, lines to measure, steps over a scale.
 
 E pushes the flow that the profile's clay is thought to have at that pressure. What comes is what
 is measured; only the pressure has to be right, and it is.
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from cdhr_host.samples.ring import CLEARANCE, TRAVEL_SPEED
 from cdhr_host.samples.words import words
-from cdhr_host.units import KPA, MINUTE, MM, MM3
+from cdhr_host.units import KPA, MINUTE, MM, MM3, MS
 
 CUP_HEIGHT = 100 * MM
 """room under the nozzle for a cup"""
@@ -70,6 +70,21 @@ def lines(pushes: Sequence[Push], beads: Sequence[Bead], clay_per_e: float) -> I
         yield f"G0 {words(Z=clear, F=travel)}"
         y += bead.spacing / MM
     yield from _tail(CLEARANCE)
+
+
+def steps(pushes: Sequence[Push], repeats: int, rest: float, clay_per_e: float) -> Iterator[str]:
+    """Clay and ``rest`` s of none in turns, every pressure ``repeats`` times, over a scale."""
+    yield from _head()
+    yield f"G0 {words(Z=CUP_HEIGHT / MM, F=TRAVEL_SPEED / MM * MINUTE)}"
+    yield "M0 tare the scale and have it write"
+    for _ in range(repeats):
+        for push in pushes:
+            yield f"G4 P{rest / MS:g}"
+            yield "G92 E0"
+            volume, rate = push.flow * push.duration / clay_per_e, push.flow / clay_per_e * MINUTE
+            yield f"G1 {words(E=volume, F=rate)} ; {push.pressure / KPA:g} kPa"
+    yield f"G4 P{2.0 * rest / MS:g}"
+    yield from _tail(CUP_HEIGHT)
 
 
 def _head() -> Iterator[str]:

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner, Result
 
@@ -193,3 +194,67 @@ def test_time_must_not_run_back(tmp_path: Path) -> None:
     result = cdhr(path, "--material", "stoneware")
     assert result.exit_code == 3
     assert "t_s = 1 comes after 2" in result.stderr
+
+
+def printed(pattern: Path, profile: str, log: Path) -> tuple[np.ndarray, ...]:
+    """Run a pattern on the simulated machine -> t, line, command in kPa, g of clay so far."""
+    words = ["stream", str(pattern), "-p", profile, "--yes", "--speed", "1000", "--log", str(log)]
+    result = CliRunner().invoke(app, words)
+    assert result.exit_code == 0, result.output
+    names = ("t_s", "line", "pressure_kpa", "deposited_mm3_s")
+    t, line, command, deposited = (pq.read_table(log)[name].to_numpy() for name in names)
+    laid = np.concatenate(([0.0], np.cumsum(deposited)[:-1])) * 1.95e-3 * np.diff(t[:2])
+    return t, line, command, laid
+
+
+@pytest.fixture
+def unled(tmp_path: Path) -> str:
+    """paper-wide with stoneware, the air not led: its commands step."""
+    path = tmp_path / "unled.toml"
+    shown = CliRunner().invoke(app, ["profile", "show", "paper-wide", "--material", "stoneware"]).stdout
+    path.write_text(shown.replace('lead = "identified"', 'lead = "off"'))
+    return str(path)
+
+
+def test_cups_of_the_simulated_machine_tell_its_clay(unled: str, tmp_path: Path) -> None:
+    """Pattern, print, scale, fit: the whole way, each piece of it the user's."""
+    pattern = tmp_path / "cups.gcode"
+    assert cdhr("--pattern", pattern, "-p", unled, "--pressures", "85,105,120,135,150").exit_code == 0
+    _, line, _, laid = printed(pattern, unled, tmp_path / "run.parquet")
+    text = pattern.read_text().splitlines()
+    pushes = [number for number, said in enumerate(text, 1) if said.startswith("G1 E")]
+    ends = [laid[line < later][-1] for later in [*pushes[1:], len(text)]]
+    rows = pattern.with_suffix(".csv").read_text().splitlines()
+    filled = [row.replace(",,", f",{g:.3f},") for row, g in zip(rows[1:], np.diff([0.0, *ends]), strict=True)]
+    pattern.with_suffix(".csv").write_text("\n".join([rows[0], *filled]))
+    record = json.loads(cdhr(pattern.with_suffix(".csv"), "-p", unled, "--json").stdout)
+    found = [record["estimates"][key]["value"] for key in ("yield_stress_pa", "consistency_pa_s_n", "index")]
+    assert found == pytest.approx([2000, 1200, 0.3], rel=0.05)
+
+
+def test_steps_of_the_simulated_machine_tell_its_delays(unled: str, tmp_path: Path) -> None:
+    pattern = tmp_path / "steps.gcode"
+    led = cdhr("--pattern", pattern, "--by", "steps", "-p", "paper-wide", "--material", "stoneware")
+    assert led.exit_code == 2
+    assert 'lead = "off"' in led.stderr
+    assert cdhr("--pattern", pattern, "--by", "steps", "-p", unled).exit_code == 0
+    t, _, command, laid = printed(pattern, unled, tmp_path / "run.parquet")
+    rows = zip(t[::10], command[::10], laid[::10], strict=True)
+    table = tmp_path / "steps.csv"
+    table.write_text("t_s,pressure_kpa,mass_g\n" + "".join(f"{a:.3f},{p:.2f},{g:.3f}\n" for a, p, g in rows))
+    record = json.loads(cdhr(table, "-p", unled, "--json").stdout)
+    keys = ("open_dead_ms", "close_dead_ms", "line_lag_ms")
+    assert [record["estimates"][key]["value"] for key in keys] == pytest.approx([110, 110, 60], abs=25)
+    assert record["steps"]["gain"] == pytest.approx([1, 1, 1], abs=0.02)
+    assert record["doubts"] == []
+
+
+def test_air_that_does_not_step_is_refused(tmp_path: Path) -> None:
+    t = np.arange(0, 10, 0.05)
+    ramp = np.where(t < 8, np.round(80 + 10 * t, 1), 0.0)
+    path = tmp_path / "t.csv"
+    rows = zip(t, ramp, t, strict=True)
+    path.write_text("t_s,pressure_kpa,mass_g\n" + "".join(f"{a:.2f},{p},{g}\n" for a, p, g in rows))
+    result = cdhr(path, "--material", "stoneware")
+    assert result.exit_code == 3
+    assert "different pressures" in result.stderr
