@@ -8,6 +8,7 @@ residuals say.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -111,6 +112,10 @@ def _solved(cables: Cables, points: Points, doubts: Doubts, frame: Frame, noise:
     known = np.isfinite(points.place)
     count = int(known.sum())
 
+    @lru_cache(maxsize=2)
+    def at(scaled: bytes) -> tuple[Array, Array]:
+        return whole(np.frombuffer(scaled))
+
     def whole(scaled: Array) -> tuple[Array, Array]:
         place, by = slopes(cables, frame, each * scaled, points.slider)
         rows = np.concatenate([(place - points.place)[known] / noise, scaled])
@@ -127,7 +132,12 @@ def _solved(cables: Cables, points: Points, doubts: Doubts, frame: Frame, noise:
 
     start = np.zeros(len(each))
     answer = least_squares(
-        lambda x: whole(x)[0], start, jac=lambda x: whole(x)[1], loss=huber, xtol=1e-12, ftol=1e-12
+        lambda x: at(x.tobytes())[0],
+        start,
+        jac=lambda x: at(x.tobytes())[1],
+        loss=huber,
+        xtol=1e-10,
+        ftol=1e-10,
     )
     rows, by = whole(answer.x)
     weight = huber(rows**2)[1][:count, None]
@@ -142,8 +152,7 @@ def _solved(cables: Cables, points: Points, doubts: Doubts, frame: Frame, noise:
 def _spread(found: Calibrated) -> float:
     """m: standard deviation of the noise that leaves such residuals, whatever a few outliers say."""
     residual = found.residual[np.isfinite(found.residual)]
-    used = float(
-        np.trace(found.information @ np.linalg.inv(found.information + np.eye(len(found.information))))
-    )
+    told = found.information
+    used = float(np.trace(told @ np.linalg.inv(told + np.eye(len(told)))))
     freedom = max(len(residual) - used, 1.0)
     return float(MAD * np.median(np.abs(residual)) * np.sqrt(len(residual) / freedom))
