@@ -75,7 +75,7 @@ def printed(run: Run, log: Path | None) -> "RunSummary":
     """Print the file; what was done stays in the log, however it ends."""
     run.source.still_the_same()
     with ExitStack() as stack:
-        out = stack.enter_context(_kept(log)) if log else None
+        out = stack.enter_context(_kept(log, run)) if log else None
         show = _shown(run, stack.enter_context(Progress("printing")))
 
         def done(rows: "Setpoints", feedback: "Feedback") -> None:
@@ -184,11 +184,12 @@ def _goes_on(pause: "Pause", stop: "Callable[[], bool]") -> bool:
 
 
 @contextmanager
-def _kept(log: Path) -> "Iterator[RunLog]":
+def _kept(log: Path, run: Run) -> "Iterator[RunLog]":
     """A run log that is kept however the run ends: it is the machine's black box."""
-    from cdhr_host.report.log import RunLog
+    from cdhr_host.report.log import RunLog, about
 
-    with writing(log, "; the machine stopped on its path, air off"), RunLog(log) as out:
+    known = about(run.machine, run.source.name)
+    with writing(log, "; the machine stopped on its path, air off"), RunLog(log, known) as out:
         try:
             yield out
         finally:

@@ -56,7 +56,8 @@ class CompactLog(Log):
     """Sliders, nozzle and pressure of a dry run, one row a tick."""
 
     def __init__(self, path: Path, period: float, metadata: Mapping[str, str] = MappingProxyType({})) -> None:
-        known = {**metadata, "period_s": repr(period)}
+        known: dict[bytes | str, bytes | str] = {"period_s": repr(period)}
+        known.update(metadata.items())
         schema = pa.schema([(name, pa.int32()) for name in COMPACT_COLUMNS], metadata=known)
         super().__init__(path, schema, WRITERS)
 

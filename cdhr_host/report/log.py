@@ -36,7 +36,9 @@ def about(profile: Profile, program: str) -> dict[str, str]:
 def _schema(names: Sequence[str], metadata: Mapping[str, str]) -> pa.Schema:
     whole = {name for name in names if name == "line" or name.endswith("_counts")}
     fields = [(name, pa.int64() if name in whole else pa.float64()) for name in names]
-    return pa.schema(fields, metadata=dict(metadata))
+    known: dict[bytes | str, bytes | str] = {}
+    known.update(metadata.items())
+    return pa.schema(fields, metadata=known)
 
 
 class Writer(Protocol):
