@@ -61,9 +61,14 @@ def best_site(
     found = [np.zeros(3)]
     for k, start in enumerate(starts):
         told(0.5 + 0.5 * k / len(starts))
-        options = {"xatol": REFINED, "fatol": 1e-4, "initial_simplex": _simplex(start[free])}
         refined = start.copy()
-        refined[free] = minimize(worse, start[free], args=(start,), method="Nelder-Mead", options=options).x
+        refined[free] = minimize(
+            worse,
+            start[free],
+            args=(start,),
+            method="Nelder-Mead",
+            options={"xatol": REFINED, "fatol": 1e-4, "initial_simplex": _simplex(start[free])},
+        ).x
         found.append(np.clip(refined, low, high))
     sites = [Site(each, float(limited_margin(space, places + each, acceleration).min())) for each in found]
     return max(sites, key=lambda site: site.margin)

@@ -117,7 +117,7 @@ def _parquet(path: Path) -> dict[str, Any]:
 
 def _black_box(path: Path) -> dict[str, Any]:
     columns, meta = read_black_box(path)
-    t = columns.get("t_s", np.zeros(0))
+    t = np.asarray(columns.get("t_s", np.zeros(0)), dtype=np.float64)
     return {
         "names": tuple(columns),
         "rows": len(t),

@@ -41,11 +41,12 @@ Rows = list[list[Panel]]
 def slider_panels(drawn: Drawn) -> Rows:
     """Position, speed, acceleration and jerk of the lower and the upper three."""
     limits = None if drawn.profile is None else drawn.profile.sliders
-    kinds: tuple[tuple[str, str, str, float | None], ...] = (
+    most = [None] * 3 if limits is None else [limits.speed_max, limits.acceleration_max, limits.jerk_max]
+    kinds = (
         ("position", "mm", "mm", None),
-        ("speed", "mm/s", "speed_mm_s", limits and limits.speed_max / MM),
-        ("acceleration", "mm/s²", "acceleration_mm_s2", limits and limits.acceleration_max / MM),
-        ("jerk", "mm/s³", "jerk_mm_s3", limits and limits.jerk_max / MM),
+        ("speed", "mm/s", "speed_mm_s", most[0]),
+        ("acceleration", "mm/s²", "acceleration_mm_s2", most[1]),
+        ("jerk", "mm/s³", "jerk_mm_s3", most[2]),
     )
     return [
         [
@@ -53,7 +54,7 @@ def slider_panels(drawn: Drawn) -> Rows:
                 f"{kind}, sliders {group[0]} to {group[-1]}",
                 unit,
                 tuple(Curve(f"slider{i}_{column}", f"{i}") for i in group),
-                None if limit is None else (-limit, limit),
+                None if limit is None else (-limit / MM, limit / MM),
             )
             for group in (LOWER, UPPER)
         ]
@@ -63,16 +64,20 @@ def slider_panels(drawn: Drawn) -> Rows:
 
 def force_panels(drawn: Drawn) -> Rows:
     """Pairs, their single cables, the upper cables, each against its window."""
-    forces = None if drawn.profile is None else drawn.profile.forces
+    windows: list[tuple[float, float] | None] = [None] * 3
+    if drawn.profile is not None:
+        forces = drawn.profile.forces
+        pairs, upper = (forces.lower_min, forces.lower_max), (forces.upper_min, forces.upper_max)
+        windows = [pairs, (forces.single_min, forces.single_max), upper]
     six = [tuple(Curve(f"tension{i}_n", f"{i}") for i in group) for group in (LOWER, UPPER)]
     sides = (("left", False), ("right", True))
     nine = tuple(
         Curve(f"tension{i}_{side}_n", f"{i} {side}", dashed) for i in LOWER for side, dashed in sides
     )
     return [
-        [Panel("pairs of cables 1 to 3", "N", six[0], forces and (forces.lower_min, forces.lower_max))],
-        [Panel("their single cables", "N", nine, forces and (forces.single_min, forces.single_max))],
-        [Panel("cables 4 to 6", "N", six[1], forces and (forces.upper_min, forces.upper_max))],
+        [Panel("pairs of cables 1 to 3", "N", six[0], windows[0])],
+        [Panel("their single cables", "N", nine, windows[1])],
+        [Panel("cables 4 to 6", "N", six[1], windows[2])],
     ]
 
 

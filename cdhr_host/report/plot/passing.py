@@ -130,7 +130,7 @@ def _vertex_columns(table: Table) -> Iterator[Array]:
     yield table.columns([f"tension{i}_n" for i in range(1, 7)]).max(axis=1) if "tension1_n" in table else none
     yield table["pressure_kpa"]
     yield table.get("margin", none)
-    yield table.get("flow_mm3_s", table["pressure_kpa"]) > 0.0
+    yield (table.get("flow_mm3_s", table["pressure_kpa"]) > 0.0).astype(np.float64)
 
 
 class _Extremes:

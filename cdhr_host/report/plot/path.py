@@ -89,13 +89,15 @@ def _coloured(axes: Any, places: Array, dye: "_Dye") -> Any:
 
     kind = LineCollection if places.shape[1] == 2 else Line3DCollection
     segments = np.stack([places[:-1], places[1:]], axis=1)
+
+    def pieces(which: Flags) -> list[Array]:
+        return list(segments[which])
+
     many = len(segments) > MANY
     laid = dye.laid if dye.laid.any() else ~dye.laid
     if not laid.all():
-        axes.add_collection(kind(segments[~laid], colors=TRAVEL, linewidths=0.5, rasterized=many))
-    lines = kind(
-        segments[laid], cmap=dye.map, linewidths=1.4 if places.shape[1] == 2 else 1.0, rasterized=many
-    )
+        axes.add_collection(kind(pieces(~laid), colors=TRAVEL, linewidths=0.5, rasterized=many))
+    lines = kind(pieces(laid), cmap=dye.map, linewidths=1.4 if places.shape[1] == 2 else 1.0, rasterized=many)
     lines.set_array(dye.values[laid])
     lines.set_clim(*dye.limits)
     axes.add_collection(lines)
