@@ -18,11 +18,11 @@ TAKING: Final = (LinkState.ARMED, LinkState.RUNNING)
 class BufferedLink:
     """The half of a MachineLink that only keeps books; whoever derives from it plays the rows."""
 
-    def __init__(self, profile: Profile, speed: float) -> None:
+    def __init__(self, profile: Profile, speed: float, lead: int = 0) -> None:
         self.profile = profile
         self.state = LinkState.CLOSED
         self.stop_tick: int | None = None
-        self._buffer = RowBuffer(profile, speed)
+        self._buffer = RowBuffer(profile, speed, lead)
         self._executed: list[Feedback] = []
         self._fault: DriveError | None = None
         self._told = True

@@ -1,7 +1,7 @@
 """Rows fed and not executed yet: credit, order, reserve, and the stop."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -40,14 +40,14 @@ class RowBuffer:
     """The buffer of a far side.
 
     It holds LOOK_AHEAD of real time, more rows for a faster clock, and beyond that the
-    ``reserve`` a path-true stop needs, which is touched only by a stop or when the last row
-    fed is at rest with the air off.
+    ``reserve`` a path-true stop needs, ``lead`` rows before it included, which is touched only
+    by a stop or when the last row fed is at rest with the air off.
     """
 
-    def __init__(self, profile: Profile, speed: float = 1.0) -> None:
+    def __init__(self, profile: Profile, speed: float = 1.0, lead: int = 0) -> None:
         self._profile = profile
         self._queue = RowQueue()
-        self.reserve = rows_needed(profile)
+        self.reserve = rows_needed(profile) + lead
         self.look_ahead = math.ceil(min(LOOK_AHEAD * speed / profile.drives.period, MAX_LOOK_AHEAD))
         self.start(np.zeros(6))
 
@@ -180,6 +180,19 @@ class RowBuffer:
         self._queue.clear()
         self._queue.append(stop)
         return int(stop.tick[0])
+
+    def begin_stop_after(self, lead: int) -> Setpoints:
+        """Keep ``lead`` rows, without air; the rows from which the stop is to be made."""
+        self.stopping = True
+        rows = self._queue.take(len(self._queue))
+        ahead = rows[:lead]
+        none = np.zeros(len(ahead))
+        self._queue.append(replace(ahead, flow=none, pressure=none.copy()))
+        return rows[lead:]
+
+    def append_stop(self, stop: Setpoints) -> None:
+        """The rows of a stop, behind those kept for its lead."""
+        self._queue.append(stop)
 
     def drop(self) -> None:
         """Forget all rows."""

@@ -8,6 +8,7 @@ calls only look at or change what the next cycle will do, except ``open``, ``arm
 import math
 from collections import deque
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Final
 
@@ -28,11 +29,14 @@ from cdhr_host.drives.reference import ReferenceStore, unreferenced
 from cdhr_host.drives.timing import CycleTiming
 from cdhr_host.drives.watch import first_fault, underrun
 from cdhr_host.errors import DriveError, Problem
+from cdhr_host.motion.hold import path_true_stop
 from cdhr_host.profile.schema import Profile
 from cdhr_host.values import Array, Feedback, Ints, Setpoints
 
 LINGER: Final = 0.05
 """s the drives hold position after a run before their brakes close"""
+LEAD: Final = 0.02
+"""s between the wish to stop and the stop's first row, in which it is worked out"""
 EASE: Final = 25
 """cycles in which the last micrometres to a run's start are covered"""
 MOVING = (LinkState.RUNNING, LinkState.STOPPING)
@@ -50,7 +54,8 @@ class CyclicLink(BufferedLink):
     def __init__(
         self, profile: Profile, clock: Clock, connect: Callable[[], Port], store: ReferenceStore
     ) -> None:
-        super().__init__(profile, clock.speed)
+        self._lead = math.ceil(LEAD / profile.drives.period)
+        super().__init__(profile, clock.speed, self._lead)
         self.resolution = profile.canopen.position_unit
         self._connect = connect
         self._machine: CanopenMachine | None = None
@@ -64,6 +69,8 @@ class CyclicLink(BufferedLink):
         self._pressure = 0.0
         self._playing = False
         self._homed = False
+        self._planner: ThreadPoolExecutor | None = None
+        self._planning: Future[Setpoints] | None = None
 
     @property
     def machine(self) -> CanopenMachine:
@@ -109,7 +116,7 @@ class CyclicLink(BufferedLink):
         except BaseException:
             port.close()
             raise
-        self._machine = machine
+        self._machine, self._planner = machine, ThreadPoolExecutor(1, "stop")
         self.state = LinkState.OPEN
 
     def arm(self, start: Array) -> None:
@@ -179,7 +186,9 @@ class CyclicLink(BufferedLink):
         if math.isfinite(self.machine.due):
             self._farewell()
         self.machine.bus.port.close()
-        self._machine = None
+        if self._planner is not None:
+            self._planner.shutdown()
+        self._machine = self._planner = None
         self._executed = []
         self.state = LinkState.CLOSED
 
@@ -232,6 +241,7 @@ class CyclicLink(BufferedLink):
             return None
         if self._playing and self._buffer.ready <= 0 and len(self._buffer):
             self._trip(underrun(*self._buffer.head()))
+        self._stop_when_planned()
         if len(self._buffer) and (self._playing or self.state is LinkState.STOPPING):
             row = self._buffer.take(1)
             return _Sent(row, self._scaling.counts(row.slider[0]))
@@ -240,7 +250,7 @@ class CyclicLink(BufferedLink):
         return None
 
     def _rest_when_landed(self) -> None:
-        if self.state is LinkState.STOPPING and not any(self._flying):
+        if self.state is LinkState.STOPPING and self._planning is None and not any(self._flying):
             self._rest()
 
     def _land(self) -> None:
@@ -292,15 +302,27 @@ class CyclicLink(BufferedLink):
         """The bus is gone: nothing can be told any more; the drives' own watchdogs stop them."""
         self._note(gone)
         self._buffer.drop()
+        self._planning = None
         self._flying.clear()
         self._rested_at = None
         self.machine.due = math.inf
         self.state = LinkState.FAULT
 
     def _begin_stop(self) -> None:
+        """Air off at once; the stop is worked out beside the cycles of its lead, not within one."""
         self.state = LinkState.STOPPING
-        self.stop_tick = self._buffer.begin_stop()
+        if len(self._buffer):
+            ahead = self._buffer.begin_stop_after(self._lead)
+            if len(ahead) and self._planner is not None:
+                self.stop_tick = int(ahead.tick[0])
+                self._planning = self._planner.submit(path_true_stop, ahead, self.profile)
         self._rest_when_landed()
+
+    def _stop_when_planned(self) -> None:
+        """The stop's rows, once those of its lead are played."""
+        if self._planning is not None and not len(self._buffer):
+            planned, self._planning = self._planning, None
+            self._buffer.append_stop(planned.result())
 
     def _rest(self) -> None:
         self.state = LinkState.FAULT if self._fault is not None else LinkState.STOPPED

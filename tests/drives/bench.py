@@ -55,6 +55,7 @@ class MemoryPort:
     def __init__(self):
         self.sent, self.arrived = [], []
         self.broken = None
+        self.trouble = None
 
     def send(self, frames):
         if self.broken is not None:
@@ -108,6 +109,10 @@ class _Settled:
     def __init__(self, port, far):
         self._port, self._far = port, far
         self.receive, self.close = port.receive, port.close
+
+    @property
+    def trouble(self):
+        return self._port.trouble
 
     def send(self, frames):
         try:

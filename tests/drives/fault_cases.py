@@ -11,6 +11,7 @@ from trajectories import run_of
 
 from cdhr_host.drives.canopen.port import transport_fault
 from cdhr_host.drives.sim.drive import State
+from cdhr_host.motion.hold import path_true_stop
 from cdhr_host.plant.disturbances import Slipped, Stuck
 
 ZERO = np.zeros(6)
@@ -79,6 +80,39 @@ def burst(bench):
         return found
 
     bench.far.inbound = inbound
+
+
+def delayed(late):
+    """From now on the wire takes ``late`` s longer to the drives and as long back."""
+
+    def spoil(bench):
+        there, back = [], []
+        plain, port = bench.far.exchange, bench.wire.port
+
+        def work(now):
+            there.append((now + late, port.sent))
+            port.sent = []
+            due = [frame for when, frames in there if when <= now + 1e-9 for frame in frames]
+            there[:] = [entry for entry in there if entry[0] > now + 1e-9]
+            back.append((now + late, plain(now, due)))
+            port.arrived += [frame for when, frames in back if when <= now + 1e-9 for frame in frames]
+            back[:] = [entry for entry in back if entry[0] > now + 1e-9]
+
+        bench.wire.work = work
+
+    return spoil
+
+
+def hold_and_press(bench):
+    """The print is held by a revision; the emergency stop is pressed while the machine stands."""
+    first = bench.link.revisable
+    bench.link.revise(path_true_stop(ROWS[first : first + bench.link.buffered], bench.profile))
+    bench.starved = True
+    bench.user.wait_until(bench.clock.now() + 2.0)
+    assert bench.link.buffered == 0
+    bench.link.feedback()
+    bench.spoilt_at = bench.clock.now()
+    bench.far.press(True)
 
 
 def outbound(bench, cob, becomes):
@@ -155,17 +189,36 @@ CASES = [
         stall(0.009),
         ("setpoint-late",),
     ),
-    Case("2 T", "six sets of RPDOs lost", "wire drops them", lambda b: several(b, 6), ("emergency",)),
+    Case("2 T", "two sets of RPDOs lost", "wire drops them", lambda b: several(b, 2), ("setpoint-late",)),
+    Case("2 T", "six sets of RPDOs lost", "wire drops them", lambda b: several(b, 6), ("setpoint-late",)),
     Case("3 T", "RPDO twice", "wire doubles it", lambda b: once(b, [0x202], lambda f: (f, f))),
     Case("3 T", "SYNC twice", "wire doubles it", lambda b: once(b, [0x80], lambda f: (f, f))),
     Case("4 T", "RPDOs in reverse order", "wire turns them", reorder),
     Case("4 T", "burst of stale frames", "wire holds all for 9 ms", burst, (), lost=2),
+    Case("4 T", "all frames 1 ms late", "wire delays", delayed(0.001)),
+    Case("4 T", "all frames 3 ms late", "wire delays", delayed(0.003)),
+    Case(
+        "4 T",
+        "all frames 10 ms late",
+        "wire delays",
+        delayed(0.010),
+        ("setpoint-late", "feedback-lost"),
+        lost=3,
+    ),
     Case("5 T", "noise, half lines, refusals", "bytes on the terminal", noise, wire=PtyWire),
     Case(
         "6 T",
         "bus-off",
         "adapter's status byte 80",
         lambda b: setattr(b.wire.adapter, "flags", 0x80),
+        ("transport",),
+        PtyWire,
+    ),
+    Case(
+        "6 T",
+        "error-passive",
+        "adapter's status byte 20",
+        lambda b: setattr(b.wire.adapter, "flags", 0x20),
         ("transport",),
         PtyWire,
     ),
@@ -267,4 +320,5 @@ CASES = [
         lambda b: b.far.press(True),
         ("axis-lost-enable", "emergency-stop"),
     ),
+    Case("26", "emergency stop in a hold", "pressed", hold_and_press, ("axis-lost-enable", "emergency-stop")),
 ]

@@ -200,6 +200,7 @@ def test_fault_of_the_machine_waits_for_an_operator():
         bench.link.fault_reset()
     bench.far.estop = False
     bench.link.fault_reset()
+    bench.user.wait_until(bench.clock.now() + 0.1)
     assert bench.far.state.name == "IDLE"
     bench.link.arm(bench.link.slider)
     bench.close()

@@ -2,63 +2,16 @@
 
 import numpy as np
 import pytest
-from bench import Bench, BridgeBench, PtyWire
-from durand_far import DurandStation
-from trajectories import PAPER, PERIOD, changed, cut, loopback, run_of
+from links import drained, fed_all, same
+from trajectories import PAPER, PERIOD, changed, cut, run_of
 
 from cdhr_host.drives import LinkState
 from cdhr_host.drives.rows import joined
 from cdhr_host.errors import DriveError
-from cdhr_host.motion.hold import path_true_stop
 
-LINKS = {
-    "loopback": loopback,
-    "slcan": lambda: over(Bench(wire=PtyWire)),
-    "link": lambda: over(BridgeBench()),
-    "durand": lambda: over(Bench(far=DurandStation, link_loss_tested=True)),
-}
 ZERO = np.zeros(6)
 LATENCY = 3
 """ticks after which the outcome of a row must have come back"""
-
-
-def over(bench):
-    bench.link.open()
-    bench.link.bench = bench
-    return bench.link, bench.user
-
-
-@pytest.fixture(params=LINKS)
-def far(request):
-    link, clock = LINKS[request.param]()
-    yield link, clock
-    link.close()
-    if hasattr(link, "bench"):
-        link.bench.close()
-
-
-def same(received, sent, link):
-    """Equal up to rounding to the link's resolution."""
-    return bool((np.abs(received - sent) <= link.resolution * 0.5001).all())
-
-
-def _drain(link, clock, until):
-    parts = []
-    for _ in range(2000):
-        parts.append(link.feedback())
-        if until():
-            return joined(parts)
-        clock.wait_until(clock.now() + 0.1)
-    raise AssertionError("the link did not come to its end")
-
-
-def _feed_all(link, clock, rows):
-    parts = []
-    while len(rows):
-        rows = rows[link.feed(rows) :]
-        parts.append(link.feedback())
-        clock.wait_until(clock.now() + 0.1)
-    return parts
 
 
 def test_life_from_closed_to_closed(far):
@@ -70,7 +23,7 @@ def test_life_from_closed_to_closed(far):
     assert link.feed(rows) == 200
     assert link.buffered == 200
     assert link.state is LinkState.RUNNING
-    _drain(link, clock, lambda: link.buffered == 0)
+    drained(link, clock, lambda: link.buffered == 0)
     assert link.state is LinkState.RUNNING
     link.stop()
     assert link.state is LinkState.STOPPED
@@ -83,8 +36,8 @@ def test_everything_fed_comes_back_exactly_once_in_order(far):
     link, clock = far
     link.arm(ZERO)
     rows = run_of(1500)
-    parts = [part for batch in cut(rows, [1, 250, 37]) for part in _feed_all(link, clock, batch)]
-    feedback = joined([*parts, _drain(link, clock, lambda: link.buffered == 0)])
+    parts = [part for batch in cut(rows, [1, 250, 37]) for part in fed_all(link, clock, batch)]
+    feedback = joined([*parts, drained(link, clock, lambda: link.buffered == 0)])
     assert (feedback.tick == rows.tick).all()
     assert same(feedback.setpoint, rows.slider, link)
     assert np.abs(feedback.slider - rows.slider).max() < 1e-4
@@ -97,7 +50,7 @@ def test_it_says_where_the_sliders_stand(far):
     link.feed(run_of(1500))
     clock.wait_until(clock.now() + 0.3)
     link.stop()
-    found = _drain(link, clock, lambda: link.state is LinkState.STOPPED)
+    found = drained(link, clock, lambda: link.state is LinkState.STOPPED)
     clock.wait_until(clock.now() + 0.2)
     link.feedback()
     assert np.abs(found.setpoint[-1]).max() > 1e-4
@@ -133,7 +86,7 @@ def test_second_run_begins_where_the_first_ended(far):
     for first in (0, 200):
         link.arm(ZERO)
         link.feed(run_of(200, first_tick=first))
-        _drain(link, clock, lambda: link.buffered == 0)
+        drained(link, clock, lambda: link.buffered == 0)
         link.stop()
     assert link.state is LinkState.STOPPED
 
@@ -276,13 +229,13 @@ def test_stop_comes_to_rest_and_can_be_armed_there(far):
     link, clock = far
     link.arm(ZERO)
     rows = run_of(3000)
-    parts = _feed_all(link, clock, rows[:1200])
+    parts = fed_all(link, clock, rows[:1200])
     link.stop()
     assert link.state is LinkState.STOPPING
     assert link.free == 0
     with pytest.raises(DriveError, match="the drives are stopping"):
         link.feed(rows[1200:])
-    feedback = joined([*parts, _drain(link, clock, lambda: link.state is LinkState.STOPPED)])
+    feedback = joined([*parts, drained(link, clock, lambda: link.state is LinkState.STOPPED)])
     assert (np.diff(feedback.tick) == 1).all()
     first = link.stop_tick
     assert same(feedback.setpoint[:first], rows.slider[:first], link)
@@ -298,102 +251,9 @@ def test_stop_comes_to_rest_and_can_be_armed_there(far):
 def test_closing_while_moving_comes_to_rest(far):
     link, clock = far
     link.arm(ZERO)
-    _feed_all(link, clock, run_of(3000)[:1000])
+    fed_all(link, clock, run_of(3000)[:1000])
     link.close()
     assert link.state is LinkState.CLOSED
     link.open()
     with pytest.raises(DriveError, match="stands at"):
         link.arm(ZERO)
-
-
-def _detour(rows, first, seed):
-    """The rows before ``first`` go on otherwise: the same place and speed, then another way to rest."""
-    ahead = len(rows) - first
-    other = run_of(ahead, seed=seed)
-    z = np.clip(np.arange(ahead)[:, None] / 200.0, 0.0, 1.0)
-    bump = z**3 * (10.0 - 15.0 * z + 6.0 * z * z)
-    share = 0.02 * bump * other.slider
-    kept = rows[first:]
-    return changed(kept, slider=kept.slider + share, line=kept.line + 1000)
-
-
-def test_revision_replaces_what_is_buffered_and_nothing_before_it(far):
-    link, clock = far
-    link.arm(ZERO)
-    rows = run_of(2000, seed=4)
-    fed = link.feed(rows)
-    clock.wait_until(clock.now() + 0.2)
-    parts = [link.feedback()]
-    first = link.revisable
-    assert len(parts[0]) < first < fed
-    assert (first - len(parts[0])) * PERIOD <= 0.2
-    other = joined([rows[:first], _detour(rows, first, seed=9)])
-    assert not same(other.slider[first + 300], rows.slider[first + 300], link)
-    link.revise(other[first:fed])
-    parts += _feed_all(link, clock, other[fed:])
-    feedback = joined([*parts, _drain(link, clock, lambda: link.buffered == 0)])
-    assert (feedback.tick == other.tick).all()
-    assert same(feedback.setpoint, other.slider, link)
-    assert link.state is LinkState.RUNNING
-
-
-def test_revision_may_end_the_run_early(far):
-    link, clock = far
-    link.arm(ZERO)
-    rows = run_of(2000, seed=4)
-    fed = link.feed(rows)
-    clock.wait_until(clock.now() + 0.2)
-    first = link.revisable
-    hold = path_true_stop(rows[first:fed], PAPER)
-    link.revise(hold)
-    feedback = _drain(link, clock, lambda: link.buffered == 0)
-    assert same(feedback.setpoint, np.vstack([rows.slider[:first], hold.slider]), link)
-    assert link.state is LinkState.RUNNING
-    link.stop()
-    assert link.state is LinkState.STOPPED
-
-
-def test_revision_of_a_tick_that_is_due_is_refused_and_changes_nothing(far):
-    link, clock = far
-    link.arm(ZERO)
-    rows = run_of(600, seed=4)
-    fed = link.feed(rows)
-    clock.wait_until(clock.now() + 0.2)
-    early = link.revisable - 1
-    with pytest.raises(DriveError, match=f"tick {early} can no longer be replaced") as caught:
-        link.revise(_detour(rows, early, seed=9))
-    assert caught.value.problems[0].kind == "late-revision"
-    first = link.revisable
-    with pytest.raises(DriveError, match=f"tick {fed + 1} came where tick {fed} is due"):
-        link.revise(rows[fed + 1 :])
-    away = changed(rows[first:fed], slider=rows.slider[first:fed] + 0.01)
-    with pytest.raises(DriveError, match=f"at tick {first}: a step of"):
-        link.revise(away)
-    rest = rows[fed:]
-    parts = _feed_all(link, clock, rest)
-    feedback = joined([*parts, _drain(link, clock, lambda: link.buffered == 0)])
-    assert same(feedback.setpoint, rows.slider, link)
-
-
-def test_revision_needs_rows_to_revise(far):
-    link, _ = far
-    with pytest.raises(DriveError, match="the drives are open"):
-        link.revise(run_of(50))
-    link.arm(ZERO)
-    with pytest.raises(DriveError, match="nothing to revise"):
-        link.revise(run_of(50))
-
-
-def test_revision_that_is_too_short_is_an_underrun_on_the_path(far):
-    link, clock = far
-    link.arm(ZERO)
-    rows = run_of(2000, seed=4)
-    fed = link.feed(rows)
-    clock.wait_until(clock.now() + 0.2)
-    first = link.revisable
-    link.revise(rows[first : first + 40])
-    with pytest.raises(DriveError) as caught:
-        _drain(link, clock, lambda: False)
-    assert caught.value.problems[0].kind == "underrun"
-    _drain(link, clock, lambda: link.state is LinkState.FAULT)
-    assert fed > first + 40

@@ -1,19 +1,20 @@
 """The fault list: every row injected, the reaction demanded."""
 
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
 from bench import Bench
+from bridge_cases import BRIDGE_CASES, run_bridge
 from fault_cases import CASES
 from fault_runs import run
+from refusal_cases import BAD_ROWS, REFUSALS, refuse, reject
 from trajectories import PAPER, run_of
 
 from cdhr_host.drives import LinkState
 from cdhr_host.drives.canopen.scaling import Scaling
 from cdhr_host.drives.reference import ReferenceStore
-from cdhr_host.drives.sim.drive import Drive, State
-from cdhr_host.drives.sim.station import Station
 from cdhr_host.errors import DriveError
 from cdhr_host.plant.disturbances import Stuck
 
@@ -25,34 +26,37 @@ def test_fault_while_moving(case):
     run(case)
 
 
+@pytest.mark.parametrize("case", BRIDGE_CASES, ids=lambda case: f"{case.row} {case.fault}")
+def test_fault_of_the_framed_link_while_moving(case):
+    run_bridge(case)
+
+
+@pytest.mark.parametrize("case", REFUSALS, ids=lambda case: f"{case.row} {case.fault}")
+def test_fault_before_anything_moves(case):
+    refuse(case)
+
+
+@pytest.mark.parametrize("case", BAD_ROWS, ids=lambda case: case.fault)
+def test_22_rows_are_refused_before_the_wire(case):
+    reject(case)
+
+
+def test_page_has_every_row_of_the_fault_list():
+    """All 26 have cases, and the page shows these cases."""
+    page = (Path(__file__).resolve().parents[2] / "docs" / "faults.md").read_text(encoding="utf-8")
+    shown = {line.split("|")[1].strip() for line in page.splitlines() if line.startswith("| ")}
+    numbers = {int(row.split()[0]) for row in shown if row[:1].isdigit()}
+    assert numbers | {16} == set(range(1, 27))
+    for case in (*CASES, *BRIDGE_CASES, *REFUSALS):
+        assert f"| {case.row} | {case.fault} | {case.injected} |" in page
+
+
 def refused(bench, said):
     """Opening is refused with these words, and the link stays closed."""
     with pytest.raises(DriveError, match=said):
         bench.link.open()
     assert bench.link.state is LinkState.CLOSED
     assert not any(drive.following for drive in bench.far.drives)
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "said"),
-    [
-        ((0x1018, 1), 0xDEAD, r"drive 3: 0x1018:01 Vendor-ID is 0xDEAD, the profile says 0x4C1"),
-        ((0x1018, 2), 7, r"drive 3: 0x1018:02 Product code is 0x7"),
-        ((0x1018, 4), 9, r"drive 3: 0x1018:04 Serial number is 9, the profile says 103"),
-        ((0x1000, 0), 0x191, r"drive 3: 0x1000:00 Device type = 0x00000191 is not a CiA 402 device"),
-        (
-            (0x6502, 0),
-            0x60,
-            r"drive 3: 0x6502:00 Supported drive modes = 0x60: mode 8 \(csp\) is not supported",
-        ),
-        ((0x6092, 1), 20000, r"drive 3: 0x6092:01 Feed makes 20000 units a motor turn, the profile 40000"),
-        ((0x6076, 0), 640, r"drive 3: 0x6076:00 Motor rated torque = 640 mN m"),
-    ],
-)
-def test_12_wrong_drive(key, value, said):
-    bench = Bench()
-    bench.far.drives[2].dictionary.fixed(key, value)
-    refused(bench, said)
 
 
 def test_12_swapped_node_ids_are_named():
@@ -64,19 +68,17 @@ def test_12_swapped_node_ids_are_named():
     assert caught.value.problems[0].hint == "that is drive 2: node ids are swapped"
 
 
-def test_12_two_nodes_with_one_id():
-    class Twins(Station):
-        @property
-        def nodes(self):
-            return [*super().nodes, self.__dict__.setdefault("twin", Drive(4, self.period))]
-
-    refused(Bench(far=Twins), "node id 4 answers twice")
-
-
-def test_12_missing_node():
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ((0x6092, 1), 20000, r"drive 3: 0x6092:01 Feed makes 20000 units a motor turn, the profile 40000"),
+        ((0x6076, 0), 640, r"drive 3: 0x6076:00 Motor rated torque = 640 mN m"),
+    ],
+)
+def test_11_other_units_or_motors_are_refused(key, value, said):
     bench = Bench()
-    bench.far.drives[4].powered = False
-    refused(bench, "no answer from drive 5 in 5 s")
+    bench.far.drives[2].dictionary.fixed(key, value)
+    refused(bench, said)
 
 
 def _writes(node):
@@ -106,40 +108,6 @@ def test_13_read_back_that_differs(key):
     refused(bench, rf"drive 6: 0x{key[0]:04X}:{key[1]:02X} .* reads back 5, written was")
 
 
-def test_13_silent_sdo_server():
-    bench = Bench()
-    bench.far.drives[1].sdo.silent = True
-    refused(bench, "drive 2 does not answer: 0x1000:00 Device type")
-
-
-def test_14_mode_not_adopted():
-    bench = Bench()
-    bench.far.drives[3].ignored_modes.add(8)
-    refused(
-        bench, "drive 4: 0x6061:00 Modes of operation display stays at 0: mode 8 was not adopted in 0.5 s"
-    )
-
-
-@pytest.mark.parametrize("state", [State.SWITCH_ON_DISABLED, State.READY, State.SWITCHED_ON])
-def test_15_transition_that_hangs(state):
-    bench = Bench().opened()
-    bench.far.drives[5].stubborn.add(state)
-    with pytest.raises(DriveError, match=r"drive 6 did not become .* in 1 s"):
-        bench.link.arm(ZERO)
-    assert bench.link.state is LinkState.OPEN
-    bench.user.wait_until(bench.clock.now() + 0.2)
-    assert not any(drive.following for drive in bench.far.drives)
-    bench.close()
-
-
-def test_19_brake_that_does_not_open():
-    bench = Bench().opened()
-    bench.far.drives[1].status_mask = 0xEFFF
-    with pytest.raises(DriveError, match="drive 2 did not follow its target"):
-        bench.link.arm(ZERO)
-    bench.close()
-
-
 def _spoilt(name, value):
     bench = Bench()
     setattr(bench.far.drives[0], name, value)
@@ -166,15 +134,6 @@ def test_16_emergency_at_boot_is_noted():
     bench.close()
 
 
-def test_8_drive_that_is_in_fault_is_not_armed():
-    bench = Bench().opened()
-    bench.far.drives[2].fault(0x2310)
-    with pytest.raises(DriveError, match=r"0x2310"):
-        bench.link.arm(ZERO)
-    assert not any(drive.following for drive in bench.far.drives)
-    bench.close()
-
-
 def test_18_counter_in_sync_only_where_all_nodes_accept_it():
     bench = Bench(sync_counter=True).opened()
     assert bench.link.machine.found.sync_counter
@@ -185,6 +144,33 @@ def test_18_counter_in_sync_only_where_all_nodes_accept_it():
     assert not bench.link.machine.found.sync_counter
     assert bench.link.notes[0].startswith("drive 4 has no 0x1019:00")
     bench.close()
+
+
+def test_18_node_that_refuses_the_counter_all_the_same():
+    """It takes 0x1019 and answers SYNC with EMCY 0x8240: nobody gets a counter."""
+    bench = Bench(sync_counter=True)
+    drive = bench.far.drives[3]
+    plain = drive.sync_accepted
+    drive.sync_accepted = lambda data: plain(data[:0]) if not data else (drive.emergency(0x8240), False)[1]
+    bench.opened()
+    assert not bench.link.machine.found.sync_counter
+    assert "EMCY 0x8240" in bench.link.notes[0]
+    bench.link.arm(ZERO)
+    bench.close()
+
+
+def test_11_reference_of_a_node_that_was_reset_is_gone(tmp_path):
+    store = ReferenceStore(tmp_path / "references.json")
+    bench = Bench(reference="stored", store=store).opened()
+    bench.link.set_reference()
+    bench.link.arm(ZERO)
+    bench.far.drives[1].reset(bench.clock.now())
+    bench.user.wait_until(bench.clock.now() + 0.5)
+    bench.close()
+    again = Bench(reference="stored", store=store).opened()
+    with pytest.raises(DriveError, match="not referenced: drive 2; nothing may move"):
+        again.link.arm(ZERO)
+    again.close()
 
 
 def test_18_absent_0x6007_needs_a_bench_test():
@@ -202,18 +188,6 @@ def test_18_absent_0x6007_needs_a_bench_test():
 def test_22_positions_beyond_32_bit_are_refused_before_the_wire(position):
     with pytest.raises(DriveError, match="does not fit 32-bit position units"):
         Scaling(PAPER).counts(np.full((1, 6), position))
-
-
-def test_25_error_value_not_kept():
-    bench = Bench()
-    bench.far.coupler.sdo.altered[0x6443, 1] = 0
-    refused(bench, "the coupler: 0x6443:01 .* reads back 0, written was 1")
-
-
-def test_25_wrong_modules():
-    bench = Bench()
-    bench.far.coupler.dictionary.fixed((0x1000, 0), 0x30191)
-    refused(bench, "has no analogue inputs and outputs")
 
 
 @pytest.mark.parametrize("moment", ["held", "homing"])

@@ -87,6 +87,8 @@ class BridgeLink(BufferedLink, Talker):
         self._expect(LinkState.OPEN, LinkState.STOPPED)
         if self._in_state(m.State.FAULT):
             raise self._said(self._code, 255, "; nothing may move")
+        if self._status is not None and not self._status.released:
+            raise fault("emergency-stop", "the emergency stop is pressed: nothing may move")
         check_standing(start, self.slider)
         self._begin_run()
         self._buffer.start(start)
@@ -107,7 +109,7 @@ class BridgeLink(BufferedLink, Talker):
             self._first = self._collected = int(accepted.tick[0])
             self._window.begin(self._first)
         self._window.add(self._encoded(accepted), rests=self._buffer.at_rest)
-        self._speak()
+        self._now(self._speak)
         self._run_when_primed()
         return len(accepted)
 
@@ -139,7 +141,7 @@ class BridgeLink(BufferedLink, Talker):
         rests = revision.rests(self.profile)
         self._pending = Pending(self._number, revision, self._encoded(rows), staged, rests)
         self._refused_late = False
-        self._send_revision()
+        self._now(self._send_revision)
         self.until(lambda: self._pending is None or self.state not in TAKING, ANSWER)
         self._pending, unanswered = None, self._pending is not None
         self._raise_fault()
@@ -189,7 +191,7 @@ class BridgeLink(BufferedLink, Talker):
             return
         self._stopping = True
         for _ in range(3):
-            self.send(Type.STOP, b"\0")
+            self._now(lambda: self.send(Type.STOP, b"\0"))
         self._status = None
         resting = {m.State.STOPPING, m.State.IDLE, m.State.FAULT}
         self.demand(lambda: self._status is not None and self._status.state in resting, "no stop")
@@ -329,6 +331,16 @@ class BridgeLink(BufferedLink, Talker):
 
     def _check(self) -> None:
         self._raise_fault()
+
+    def _now(self, action: Callable[[], None]) -> None:
+        """Send something outside a turn; a line that is gone is the link's fault, told here."""
+        try:
+            action()
+        except DriveError as gone:
+            self.due = math.inf
+            self._lost(gone)
+            self._raise_fault()
+            raise
 
     def _lost(self, gone: DriveError) -> None:
         self._note(gone)

@@ -102,15 +102,17 @@ class Status:
     position: tuple[int, ...]
     dropped: int
     revision: int
+    released: bool
+    """whether the emergency stop is released"""
 
 
 def status(payload: bytes) -> Status:
     """STATUS; raises struct.error for another length."""
-    tick, expected, stop, output, buffered, capacity, state, _, _, revision = STATUS.unpack_from(payload)
+    tick, expected, stop, output, buffered, capacity, state, inputs, _, revision = STATUS.unpack_from(payload)
     axes = [STATUS_AXIS.unpack_from(payload, STATUS.size + k * STATUS_AXIS.size)[0] for k in range(6)]
     end = STATUS_END.unpack_from(payload, STATUS.size + 6 * STATUS_AXIS.size)
     ticks = (tick, expected, None if stop == NO_TICK else stop, output)
-    return Status(*ticks, buffered, capacity, State(state), tuple(axes), end[5], revision)
+    return Status(*ticks, buffered, capacity, State(state), tuple(axes), end[5], revision, bool(inputs & 1))
 
 
 def ramp_ticks(profile: Profile) -> int:

@@ -29,8 +29,8 @@ COUPLER: Final = 7
 HOST: Final = 127
 SIGNED: Final = (2, 3, 4)
 """data types INTEGER8, 16 and 32, CiA 301"""
-SCAN: Final = 0.3
-"""s nodes may take to answer a scan"""
+SCAN: Final = 0.4
+"""s nodes may take to answer a scan, and once more after the last request"""
 
 
 class Abort(Exception):  # noqa: N818 - an answer of a node
@@ -168,6 +168,7 @@ class Bus:
         for first in range(1, 128, 16):
             self.port.send([(0x600 + node, request) for node in range(first, min(first + 16, 128))])
             self.until(lambda: False, SCAN / 8)
+        self.until(lambda: False, SCAN)
         self.on_frame = lambda _frame: False
         return sorted(found)
 

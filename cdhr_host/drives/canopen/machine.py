@@ -22,7 +22,8 @@ from cdhr_host.drives.canopen.cia402 import (
     SWITCH_ON,
     State,
 )
-from cdhr_host.drives.canopen.setup import START, Found, bring_up
+from cdhr_host.drives.canopen.port import transport_fault
+from cdhr_host.drives.canopen.setup import PRE_OPERATIONAL, START, Found, bring_up, drop_counter
 from cdhr_host.drives.canopen.watch import Watch
 from cdhr_host.drives.faults import fault
 from cdhr_host.drives.slcan import Frame
@@ -40,6 +41,8 @@ HEARTBEAT: Final = 0.05
 """s between two heartbeats of the host; only the cycle sends them"""
 TRANSITION: Final = 1.0
 """s a transition of a drive may take"""
+SYNC_LENGTH: Final = 0x8240
+"""EMCY code of a node that expects a SYNC of another length"""
 ALIVE: Final = 3
 """answers each drive must have given before anything is enabled"""
 
@@ -91,8 +94,25 @@ class CanopenMachine:
         for axis in self.axes:
             axis.answers = axis.missed = 0
         self.bus.boots.clear()
-        self.run_until(lambda: all(axis.answers >= ALIVE for axis in self.axes), "answer SYNC", self._silent)
+        try:
+            self._await_answers()
+        except DriveError:
+            if not self.found.sync_counter or SYNC_LENGTH not in self.watch.codes:
+                raise
+            self._without_counter()
+            self._await_answers()
         self.bus.background = self._keep_alive
+
+    def _await_answers(self) -> None:
+        self.run_until(lambda: all(axis.answers >= ALIVE for axis in self.axes), "answer SYNC", self._silent)
+
+    def _without_counter(self) -> None:
+        """A node that took 0x1019 and refuses its SYNC all the same: nobody gets a counter."""
+        self.bus.command(PRE_OPERATIONAL)
+        drop_counter(self.bus, self.found)
+        self.bus.emergencies.clear()
+        self.due = self.bus.clock.now() + self._period
+        self.bus.command(START)
 
     def listen(self) -> Iterator[DriveError]:
         """Wait for the cycle, send SYNC, read and check the answers; what is wrong."""
@@ -106,7 +126,9 @@ class CanopenMachine:
         self.bus.pump()
         pending, self._pending = self._pending, []
         yield from pending
-        yield from self.watch.findings(clock.now())
+        if (trouble := self.bus.port.trouble) is not None:
+            yield transport_fault(trouble)
+        yield from self.watch.findings(clock.now(), streaming=self.streaming)
         late, self._late = self._late, False
         if late and self.streaming:
             worst = self.lateness.summary().max

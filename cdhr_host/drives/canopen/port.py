@@ -5,15 +5,23 @@ from typing import Protocol
 
 import can
 
-from cdhr_host.drives.slcan import BUS_ERROR, Frame, SlcanBus
+from cdhr_host.drives.slcan import BUS_ERROR, ERROR_PASSIVE, Frame, SlcanBus
 from cdhr_host.errors import DriveError, Problem
 
-ASK_EVERY = 25
+ASK_EVERY = 10
 """receptions between two questions for an adapter's status"""
+
+
+PASSIVE = "the controller is error-passive: nobody acknowledges its frames, or the bus is disturbed"
 
 
 class Port(Protocol):
     """Where frames go in and out; raises DriveError of kind ``transport`` once it is unusable."""
+
+    @property
+    def trouble(self) -> str | None:
+        """Why one should stop while frames still pass; None for a bus that is well."""
+        ...
 
     def send(self, frames: Sequence[Frame]) -> None:
         """Send all, in order."""
@@ -47,6 +55,11 @@ class SlcanPort:
             raise transport_fault(str(error)) from error
         self._turn = 0
         self._rejected = 0
+
+    @property
+    def trouble(self) -> str | None:
+        """An adapter that is error-passive."""
+        return PASSIVE if self._bus.flags & ERROR_PASSIVE else None
 
     def send(self, frames: Sequence[Frame]) -> None:
         """One write for all."""
@@ -87,6 +100,19 @@ class CanPort:
             self._bus = can.Bus(interface=interface, channel=channel, bitrate=bitrate)
         except (can.CanError, OSError, ValueError) as error:
             raise transport_fault(f"cannot open {interface}:{channel}: {error}") from error
+        self._turn = 0
+
+    @property
+    def trouble(self) -> str | None:
+        """A controller that is error-passive, where the interface knows."""
+        self._turn += 1
+        return PASSIVE if self._turn % ASK_EVERY == 0 and self._state() is can.BusState.PASSIVE else None
+
+    def _state(self) -> can.BusState:
+        try:
+            return self._bus.state
+        except NotImplementedError:
+            return can.BusState.ACTIVE
 
     def send(self, frames: Sequence[Frame]) -> None:
         """Send one by one."""

@@ -195,6 +195,17 @@ def _counter(bus: Bus, found: Found) -> bool:
     if not absent:
         return True
     found.notes += [f"{note}: SYNC carries no counter" for note in absent]
+    _write_no_counter(bus)
+    return False
+
+
+def drop_counter(bus: Bus, found: Found) -> None:
+    """No counter after all: a node answered it with EMCY 0x8240. All nodes PRE-OPERATIONAL."""
+    found.sync_counter = False
+    found.notes.append("a node sent EMCY 0x8240 for SYNC with a counter: SYNC carries none")
+    _write_no_counter(bus)
+
+
+def _write_no_counter(bus: Bus) -> None:
     for node in NODES:
         optional(bus, node, 0x1019, 0, 0)
-    return False

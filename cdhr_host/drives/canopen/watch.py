@@ -23,11 +23,14 @@ FEEDBACK_LOST: Final = 3
 SOFT_SILENCE: Final = 0.1
 """s without answers that pass where soft real time is allowed: serial lines deliver late too"""
 UNFOLLOWING: Final = 2
+WATCHDOG: Final = 0x8250
+"""EMCY code of a drive whose receive PDO came too late"""
 ENCODER_LOST: Final = (0x7300, 0x7320)
 
 
 class Watch:
-    """Findings of one cycle; ``unreferenced`` gathers axes whose position cannot be trusted."""
+    """Findings of one cycle; ``unreferenced`` gathers axes whose position cannot be trusted,
+    ``codes`` the emergency codes seen."""
 
     def __init__(self, profile: Profile, bus: Bus, axes: list[Axis]) -> None:
         settings = profile.canopen
@@ -43,13 +46,16 @@ class Watch:
         self._settling = settings.pressure_settling
         self._away_since: float | None = None
         self.unreferenced: set[int] = set()
+        self.codes: set[int] = set()
         self.warnings: list[str] = []
         self.enabled = False
 
-    def findings(self, now: float) -> Iterator[DriveError]:
+    def findings(self, now: float, *, streaming: bool = False) -> Iterator[DriveError]:
         """Everything wrong in this cycle."""
         yield from self._nodes(now)
         yield from self._emergencies()
+        if streaming and self.enabled and all(self._starved(axis) for axis in self._axes):
+            yield fault("setpoint-late", "the drives did not get two setpoints in a row")
         for axis in self._axes:
             yield from self._feedback(axis)
             if self.enabled:
@@ -93,7 +99,13 @@ class Watch:
                 continue
             if code in ENCODER_LOST and node != COUPLER:
                 self.unreferenced.add(node - 1)
-            yield fault("emergency", f"{node_name(node)}: {meaning(code)} (error register 0x{register:02X})")
+            self.codes.add(code)
+            kind = "setpoint-late" if code == WATCHDOG else "emergency"
+            yield fault(kind, f"{node_name(node)}: {meaning(code)} (error register 0x{register:02X})")
+
+    def _starved(self, axis: Axis) -> bool:
+        """Enabled as it was, and not following a target any more."""
+        return axis.state is State.ENABLED and not axis.status & FOLLOWS_TARGET
 
     def _feedback(self, axis: Axis) -> Iterator[DriveError]:
         name = node_name(axis.node)

@@ -1,13 +1,15 @@
 """What runs in the sender's process: cycles, the ring, and one command at a time.
 
-No logging, no garbage collection, no thread, no allocation that grows: the loop does a
-cycle, moves rows, publishes where it is.
+No logging, no garbage collection, no allocation that grows: the loop does a cycle, moves
+rows, publishes where it is. The only other thread works out a stop, once it is wanted, and
+gives way every SWITCH.
 """
 
 import ctypes
 import gc
 import os
 import signal
+import sys
 from dataclasses import dataclass
 from enum import IntEnum
 from multiprocessing.connection import Connection
@@ -31,6 +33,8 @@ from cdhr_host.profile.schema import Profile
 from cdhr_host.values import Feedback, Setpoints
 
 PRIORITY: Final = 60
+SWITCH: Final = 1e-4
+"""s after which the thread that works out a stop gives way to the cycle"""
 CAPACITY: Final = 1024
 """setpoints in the ring, besides those in the sender's own buffer"""
 RESULTS: Final = 16384
@@ -83,10 +87,11 @@ def run(spec: Spec, commands: Connection) -> None:
 
 
 def hurry() -> bool:
-    """SCHED_FIFO for all (the only) threads, memory locked, collector off; whether FIFO was allowed."""
+    """SCHED_FIFO for this and all later threads, memory locked, collector off; whether FIFO was allowed."""
     gc.collect()
     gc.freeze()
     gc.disable()
+    sys.setswitchinterval(SWITCH)
     ctypes.CDLL(None).mlockall(3)
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))

@@ -1,17 +1,22 @@
 """Rings of records in shared memory: one process writes, one reads, nobody waits."""
 
+import zlib
 from dataclasses import fields
 from multiprocessing.shared_memory import SharedMemory
 from typing import Any, Final
 
 import numpy as np
 
+from cdhr_host.drives.faults import fault
 from cdhr_host.values import Array, Feedback, Setpoints
 
 SETPOINTS: Final = {"nozzle_G": 3, "upper": 3, "slider": 6, "tension": 6}
 FEEDBACK: Final = {"setpoint": 6, "slider": 6, "counts": 6, "torque": 6, "force": 3}
 WHOLE: Final = ("tick", "line", "counts")
 """columns of whole numbers; below 2**53 they survive as float64"""
+LOOKS: Final = 3
+"""times a record that seems damaged is looked at: it may be on its way between two processors"""
+UNMEASURED: Final = ("force", "deposited")
 HEAD: Final = 16
 """bytes of the two counters"""
 
@@ -20,15 +25,17 @@ class Ring:
     """``capacity`` records of ``width`` float64; ``written`` and ``taken`` only ever grow.
 
     Each counter is an aligned 8-byte word that one side writes after the records it stands
-    for, so that the other side never sees a record before it is complete.
+    for, so that the other side never sees a record before it is complete. Nothing in Python
+    orders the two stores for another processor, so every record also carries a CRC-32 of its
+    bytes and its number: one that is not complete, or of an earlier round, is never taken.
     """
 
     def __init__(self, width: int, capacity: int, name: str | None = None) -> None:
         self.capacity = capacity
-        self._memory = SharedMemory(name, create=name is None, size=HEAD + 8 * width * capacity)
+        self._memory = SharedMemory(name, create=name is None, size=HEAD + 8 * (width + 1) * capacity)
         self._owner = name is None
         self._counters = np.ndarray((2,), np.int64, self._memory.buf)
-        self._records = np.ndarray((capacity, width), np.float64, self._memory.buf, HEAD)
+        self._records = np.ndarray((capacity, width + 1), np.float64, self._memory.buf, HEAD)
         if self._owner:
             self._counters[:] = 0
 
@@ -51,16 +58,14 @@ class Ring:
         """(N, width), N <= space."""
         at = self.written
         slots = (at + np.arange(len(records))) % self.capacity
-        self._records[slots] = records
+        self._records[slots] = np.column_stack([records, _checks(records, at)])
         self._counters[0] = at + len(records)
 
     def take(self, most: int) -> Array:
-        """(N, width), the oldest records, N <= most."""
+        """(N, width), the oldest records, N <= most; DriveError for one that is damaged."""
         at = int(self._counters[1])
-        count = min(self.written - at, most)
-        if count <= 0:
-            return self._records[:0].copy()
-        records = self._records[(at + np.arange(count)) % self.capacity]
+        count = max(min(self.written - at, most), 0)
+        records = self._whole(at, count)
         self._counters[1] = at + count
         return records
 
@@ -71,11 +76,20 @@ class Ring:
 
     def record(self, k: int) -> Array:
         """(1, width), the ``k``-th of the waiting records."""
-        return self._records[[(int(self._counters[1]) + k) % self.capacity]]
+        return self._whole(int(self._counters[1]) + k, 1)
 
     def cut(self, count: int) -> None:
         """Forget all waiting records but the first ``count``; only while the writer stands still."""
         self._counters[0] = int(self._counters[1]) + count
+
+    def _whole(self, at: int, count: int) -> Array:
+        """Records by number, once each is what its CRC says."""
+        for _ in range(LOOKS):
+            found = self._records[(at + np.arange(count)) % self.capacity]
+            records = np.ascontiguousarray(found[:, :-1])
+            if (found[:, -1] == _checks(records, at)).all():
+                return records
+        raise fault("ring", f"a record between host and sender is damaged (number {at} or later)")
 
     def close(self) -> None:
         """Give the memory back; the owner's ``close`` removes it."""
@@ -83,6 +97,13 @@ class Ring:
         self._memory.close()
         if self._owner:
             self._memory.unlink()
+
+
+def _checks(records: Array, first: int) -> Array:
+    """(N,) CRC-32 of each record, begun with its number."""
+    return np.array(
+        [zlib.crc32(row.tobytes(), first + k & 0xFFFFFFFF) for k, row in enumerate(records)], dtype=np.float64
+    )
 
 
 def width(columns: dict[str, int], kind: type[Setpoints] | type[Feedback]) -> int:
@@ -108,8 +129,12 @@ def setpoints(records: Array) -> Setpoints:
 
 
 def feedback(records: Array) -> Feedback:
-    """(N, width) records -> rows."""
-    return Feedback(**_columns(records, Feedback, FEEDBACK))
+    """(N, width) records -> rows; a column nobody measured is empty again."""
+    found = _columns(records, Feedback, FEEDBACK)
+    for name in UNMEASURED:
+        if np.isnan(found[name]).all():
+            found[name] = found[name][:0]
+    return Feedback(**found)
 
 
 def _columns(

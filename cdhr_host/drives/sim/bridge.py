@@ -221,7 +221,7 @@ class Bridge:
         self._start()
 
     def _read_object(self, payload: bytes) -> None:
-        self.wire.say(0xA0, self._objects.read(payload, self._motors.position))
+        self.wire.say(0xA0, self._objects.read(payload, self._motors.position, self._status_word))
 
     def _write_object(self, payload: bytes) -> None:
         self.wire.say(0xA1, self._objects.write(payload, standing=self.state in STANDING))
@@ -345,6 +345,11 @@ class Bridge:
             self.wire.say(0x93, struct.pack("<IB3x", self._next_sent, len(batch)) + body)
             self._next_sent += len(batch)
 
+    @property
+    def _status_word(self) -> int:
+        """Of every drive: operation enabled and following, or switch-on disabled."""
+        return 0x0250 if self.state in STANDING else 0x1237
+
     def _status(self) -> bytes:
         store = self.store
         expected = store.tick if store.expected is None else store.expected
@@ -352,7 +357,7 @@ class Bridge:
         rate = store.pace.rate * 1000 >> 16
         head = struct.pack("<IIIIHHBBHBx", *ticks, self.state, int(not self.estop), rate, store.revision)
         axes = b"".join(
-            struct.pack("<ihhH", at, 0, torque, 0x1237)
+            struct.pack("<ihhH", at, 0, torque, self._status_word)
             for at, torque in zip(self._motors.position, self._motors.torque, strict=True)
         )
         counters = (self.dropped & 0xFFFF, self.gaps & 0xFFFF, self.late & 0xFFFF)

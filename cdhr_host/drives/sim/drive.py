@@ -28,6 +28,8 @@ S = State
 BRAKE: Final = 0.05
 """s a brake takes to open"""
 HELD_BY_BRAKE: Final = (S.NOT_READY, S.SWITCH_ON_DISABLED, S.READY, S.SWITCHED_ON, S.FAULT)
+GUESSES: Final = 2
+"""cycles without a setpoint of its own after which a drive says so"""
 CSP, IP, HOMING = 8, 7, 6
 
 
@@ -60,7 +62,7 @@ class Drive(Node):
         self.lost = 0
         self._period = period
         self._speed = 0.0
-        self._guessed = 0
+        self._guessed = self._starved = 0
         self._exact = 0.0
         self._released_at = 0.0
         self._away_since: float | None = None
@@ -73,6 +75,11 @@ class Drive(Node):
     def following(self) -> bool:
         """Whether the axis follows its setpoints: enabled, brake open."""
         return self.drive_state is S.ENABLED and self._now >= self._released_at
+
+    @property
+    def _on_target(self) -> bool:
+        """Bit 12: it follows what the host told; not when a second SYNC in a row brought nothing."""
+        return self.following and self._starved < GUESSES
 
     @property
     def moving(self) -> bool:
@@ -97,6 +104,7 @@ class Drive(Node):
         """Take what the last cycle's RPDO brought, run the state machine, find the next setpoint."""
         self._now = now
         self.fresh = self.apply_sync()
+        self._starved = 0 if self.fresh else self._starved + 1
         self._control()
         self.commanded = self._next_setpoint()
         self._publish()
@@ -243,7 +251,7 @@ class Drive(Node):
         word = self.drive_state | 0x200 | (0x10 if self.drive_state is not S.FAULT else 0)
         if self.drive_state is S.ENABLED:
             word |= 0x1400 if self.values[0x6061, 0] == HOMING and self._homed else 0
-            word |= 0x1000 if self.values[0x6061, 0] != HOMING and self.following else 0
+            word |= 0x1000 if self.values[0x6061, 0] != HOMING and self._on_target else 0
         self.values[0x6041, 0] = (word | self.status_extra) & self.status_mask
         self.values[0x6064, 0] = self.actual
         self.values[0x60FE, 1] = int(self.drive_state in HELD_BY_BRAKE)

@@ -18,13 +18,14 @@ class Objects:
         self._profile = profile
         self._nodes: dict[int, Dictionary] = {}
 
-    def read(self, payload: bytes, position: tuple[int, ...]) -> bytes:
-        """OD_READ's payload -> OD_READ_ACK's."""
+    def read(self, payload: bytes, position: tuple[int, ...], status: int) -> bytes:
+        """OD_READ's payload -> OD_READ_ACK's; (6,) position units and the status word of the drives."""
         node, index, sub = struct.unpack_from("<BHB", payload)
         try:
             dictionary = self._node(node)
             if node <= len(position):
                 dictionary.values[0x6064, 0] = position[node - 1]
+                dictionary.values[0x6041, 0] = status
             return _answer(node, index, sub, 0, dictionary.upload((index, sub)))
         except Abort as abort:
             return _answer(node, index, sub, abort.code)
