@@ -198,7 +198,7 @@ class Player:
     def back(self) -> bool:
         """Begin the way back to the program set aside; whether there is any. Raises MotionError."""
         assert self.aside is not None
-        places = self.aside.way_back(self.staircase.standing_G)
+        places = self.aside.way_back(self.staircase.standing_G, self.profile.bed.clear_height)
         if len(places):
             self._play(Kind.BACK, through(self.staircase, places, BACK_SPEED), 1.0)
         return bool(len(places))

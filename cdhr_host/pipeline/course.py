@@ -60,6 +60,10 @@ class Placed:
         return nozzle_standing_at(self.step.track, tick)
 
 
+SKIP = 20_000
+"""ticks planned at a time where nothing of them is wanted"""
+
+
 class Course:
     """One text on its way; ``at`` is the number of the command it goes on with."""
 
@@ -96,6 +100,15 @@ class Course:
         while not self._over and self.staircase.tick <= until:
             if next(self._steps, None) is None:
                 self._over = True
+
+    def skip(self, until: int) -> None:
+        """Plan up to a tick, forgetting on the way what lies before it; rows begin there."""
+        while not self._over and self.staircase.tick <= until:
+            self.plan(min(self.staircase.tick + SKIP, until))
+            self.drop(min(self.staircase.tick, until))
+            self.forget(self.oldest)
+        while self.stops and self.stops[0].tick <= until:
+            self.passed()
 
     def close(self) -> None:
         """Read no further; what was read stays in force for the machine's next lines."""
