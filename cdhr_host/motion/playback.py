@@ -70,10 +70,15 @@ class Ramp:
             _value(polyder(self.rate), z) / scale,
         )
 
-    def bend(self, t: float) -> float:
-        """1/tick² at a tick: change of the rate's change."""
-        z = (t - self.begin) / self._scale
-        return float(_value(polyder(self.rate, 2), np.array([z]))[0] / self._scale**2)
+    def start(self, t: float) -> "Start":
+        """What a ramp from a tick on continues."""
+        scale = self._scale
+        z = (t - self.begin) / scale
+        area = rate = slope = bend = 0.0
+        for power, c in reversed(list(enumerate(self.rate.tolist()))):
+            area = area * z + c / (power + 1)
+            bend, slope, rate = bend * z + 2.0 * slope, slope * z + rate, rate * z + c
+        return Start(t, self.u + scale * area * z, rate, slope / scale, bend / scale**2)
 
     @property
     def _scale(self) -> float:
@@ -126,7 +131,7 @@ def landing(start: Start, duration: float, target: float) -> Ramp:
 
 def _after(ramped: Ramp, target: float) -> Ramp:
     """The constant rate a ramp leads to."""
-    return steady(ramped.end, float(ramped.at(np.array([ramped.end])).u[0]), target)
+    return steady(ramped.end, ramped.start(ramped.end).u, target)
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,8 +172,7 @@ class Pace:
     def start(self, t: float) -> Start:
         """What a ramp from a tick on continues."""
         piece = next(each for each in reversed(self.ramps) if each.begin <= t or each is self.ramps[0])
-        u, rate, slope = (float(part[0]) for part in piece.at(np.array([t])))
-        return Start(t, u, rate, slope, piece.bend(t))
+        return piece.start(t)
 
     def whole(self, first: float) -> bool:
         """Whether from this tick on the plan is played as it is, tick for tick."""

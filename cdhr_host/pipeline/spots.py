@@ -8,8 +8,9 @@ from cdhr_host.motion.leg import Leg
 from cdhr_host.motion.sampling import Timed
 from cdhr_host.motion.time_law import TimeLaw
 from cdhr_host.pipeline.course import Course, Placed
-from cdhr_host.values import Array
 
+HALVINGS = 60
+"""of a piece of a time law, down to rounding"""
 NEAR = 1e-9
 """m or s beyond a stretch that are rounding"""
 
@@ -78,10 +79,10 @@ def _within(placed: Placed, place: Spot) -> float | None:
 def time_of(law: TimeLaw, s: float) -> float:
     """s at which a law reaches a place, by halving the piece it lies on."""
     piece = max(int(np.searchsorted(law.state[0], s, side="right")) - 1, 0)
-    low = float(law.t[piece])
-    high = float(law.t[piece + 1]) if piece + 1 < len(law.t) else law.duration
-    for _ in range(60):
-        middle = (low + high) / 2
-        at: Array = law.at(np.array([middle]))[0]
-        low, high = (middle, high) if at[0] < s else (low, middle)
-    return (low + high) / 2
+    begin = float(law.t[piece])
+    low, high = 0.0, (float(law.t[piece + 1]) if piece + 1 < len(law.t) else law.duration) - begin
+    s0, v, a, j = law.state[:, piece].tolist()
+    for _ in range(HALVINGS):
+        x = (low + high) / 2
+        low, high = (x, high) if s0 + x * (v + x * (a / 2 + x * (j / 6))) < s else (low, x)
+    return begin + (low + high) / 2
