@@ -20,13 +20,13 @@ from cdhr_host.values import Command, Moves
 
 AHEAD: Final = 3.0
 """s of real time planned ahead; a client that pauses is obeyed that late"""
-WAITING_MAX: Final = 128
+WAITING_MAX: Final = 256
 """short lines not read yet while the plan needs more"""
 WAITING_FULL: Final = 8
 """the same otherwise: more than any client has in flight"""
-TOGETHER: Final = 128
+TOGETHER: Final = 256
 """short lines read at once"""
-EVERY: Final = 0.02
+EVERY: Final = 0.05
 """s of real time between two readings of short lines, and"""
 SETTLED: Final = 1.0
 """s of real time settled ahead; the plan is settled further only below that"""

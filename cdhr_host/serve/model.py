@@ -204,7 +204,7 @@ def _motion_report(view: View) -> Object:
     area = math.pi / 4 * (view.profile.extruder.filament_diameter / MM) ** 2
     return {
         "live_position": _position(view),
-        "live_velocity": number(view.status.velocity / MM),
+        "live_velocity": number(view.status.velocity / MM) if view.status.buffered else 0.0,
         "live_extruder_velocity": number(view.status.flow / MM3 / area),
         "steppers": [],
         "trapq": [],

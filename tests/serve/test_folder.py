@@ -53,7 +53,9 @@ def test_names_that_lead_elsewhere_are_refused(tmp_path: Path, name: str) -> Non
     assert list(folder.root.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["vase.gcode", "Töpfe/Große Vase (2).gcode", "a/b/c/x.g", "x.gcode.gz", "ÄÖ 🏺.nc"])
+@pytest.mark.parametrize(
+    "name", ["vase.gcode", "Töpfe/Große Vase (2).gcode", "a/b/c/x.g", "x.gcode.gz", "ÄÖ 🏺.nc"]
+)
 def test_plain_names_are_taken(tmp_path: Path, name: str) -> None:
     folder = Folder(tmp_path / "programs")
     put(folder, name)

@@ -28,7 +28,7 @@ def test_numbers_are_in_the_units_of_clients() -> None:
     found = objects(
         view(
             state=JobState.PRINTING, progress=PROGRESS, nozzle_G=np.array([0.01, -0.02, 0.003]),
-            velocity=0.05, flow=250e-9, pressure=148e3, feed_override=1.2,
+            velocity=0.05, buffered=9, flow=250e-9, pressure=148e3, feed_override=1.2,
         )
     )  # fmt: skip
     assert found["toolhead"]["position"][:3] == [10.0, -20.0, 3.0]

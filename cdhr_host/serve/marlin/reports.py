@@ -35,7 +35,7 @@ def position(bench: Bench) -> str:
     sliders = " ".join(
         f"{letter}:{value / MM:.3f}" for letter, value in zip("XYZUVW", status.slider, strict=True)
     )
-    e = bench.modes.e if bench.streaming else filament_mm(bench.host.view())
+    e = bench.modes.e or filament_mm(bench.host.view())
     return f"X:{x:.3f} Y:{y:.3f} Z:{z:.3f} E:{e:.3f} Count {sliders}"
 
 
