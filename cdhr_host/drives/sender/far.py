@@ -153,10 +153,17 @@ class Sender:
         try:
             answer: Any = getattr(self, f"_do_{name}")(*arguments)
             self._publish()
-            self._commands.send(("done", answer))
+            self._say("done", answer)
         except DriveError as error:
             self._publish()
-            self._commands.send(("refused", error.problems))
+            self._say("refused", error.problems)
+
+    def _say(self, what: str, answer: object) -> None:
+        """To the host; one that is gone asks for the end."""
+        try:
+            self._commands.send((what, answer))
+        except OSError:
+            self._abandoned()
 
     def _abandoned(self) -> None:
         self._take_rows()
@@ -230,7 +237,7 @@ class Sender:
             self._take_rows()
             executed = self._link.feedback()
         except DriveError as error:
-            self._commands.send(("fault", error.problems))
+            self._say("fault", error.problems)
             self._status[Word.FAULTS] += 1
             return
         if len(executed):
