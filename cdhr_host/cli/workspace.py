@@ -108,7 +108,7 @@ def _part(source: Source, space: "Workspace", chart: "MarginMap", acceleration: 
 def _title(machine: str, source: Source | None, acceleration: float) -> str:
     parts = [
         machine,
-        source.name if source is not None else "",
+        Path(source.name).name if source is not None else "",
         f"{acceleration:g} mm/s² in hand" if acceleration else "",
     ]
     return "  ·  ".join(part for part in parts if part)
