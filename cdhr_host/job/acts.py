@@ -7,15 +7,19 @@ from contextlib import suppress
 from cdhr_host.drives.clock import Clock
 from cdhr_host.drives.link import LinkState
 from cdhr_host.drives.rows import joined
-from cdhr_host.errors import CdhrError, JobError, MotionError, Problem
+from cdhr_host.errors import CdhrError, DriveError, JobError, MotionError, Problem
 from cdhr_host.job.line_stream import LineStream
 from cdhr_host.job.lines import Lines
 from cdhr_host.job.player import Kind, Player, Rest
 from cdhr_host.job.program import Program
 from cdhr_host.job.reading import Count, Reader, Seen
+from cdhr_host.job.recorder import Recorder
+from cdhr_host.job.records import Records
+from cdhr_host.job.recovery import Recovery, Resuming
 from cdhr_host.job.states import MOVING, Word
 from cdhr_host.job.surface import JobState, Status
 from cdhr_host.job.telling import Telling
+from cdhr_host.job.watchdogs import Alarm, Reaction
 from cdhr_host.units import MM
 from cdhr_host.values import Feedback, Setpoints
 
@@ -27,8 +31,16 @@ Happen = Callable[[Word, str], None]
 class Acts:
     """Everything here runs in the printer's thread, but for the checks and ``status``."""
 
-    def __init__(self, player: Player, clock: Clock, telling: Telling, happened: Happen) -> None:
+    def __init__(
+        self,
+        player: Player,
+        clock: Clock,
+        telling: Telling,
+        happened: Happen,
+        recorder: Recorder | None = None,
+    ) -> None:
         self.player = player
+        self.records = Records(player, recorder, telling)
         self.message = ""
         self.fault: CdhrError | None = None
         self._clock = clock
@@ -99,6 +111,10 @@ class Acts:
         """Raises JobError where no print can begin."""
         if not self.player.homed:
             self.player.refuse_start()
+        self.check_busy()
+
+    def check_busy(self) -> None:
+        """Raises JobError while something moves."""
         if self.player.busy:
             raise JobError(Problem("busy", "the machine still moves", hint="wait until it stands"))
 
@@ -106,7 +122,17 @@ class Acts:
         """Begin the program."""
         assert self._program is not None
         self._count = Count(self._program, self._clock.now())
+        self.records.begin(self._program.file)
         self.player.print(self._program)
+
+    def recover(self, recovery: Recovery, goes_on: str) -> None:
+        """Take the program up in its middle, as if it had been held there."""
+        program = self._program
+        assert program is not None
+        self._count = Count(program, self._clock.now(), line=recovery.line)
+        self._count.plan = recovery.tick * self.player.profile.drives.period
+        self.player.recover(Resuming(program, self.player.staircase.rig).aside(recovery.tick))
+        self.records.begin(program.file, goes_on=goes_on)
 
     def open(self, name: str) -> LineStream:
         """Print what a client sends."""
@@ -167,6 +193,7 @@ class Acts:
         if link.state is LinkState.CLOSED:
             link.open()
         self.player.over()
+        self.records.acknowledged()
 
     def check_override(self, flow: float | None) -> None:
         """Raises JobError for a flow that the air cannot give."""
@@ -201,6 +228,9 @@ class Acts:
         while self.player.link.state is LinkState.STOPPING:
             self._clock.wait_until(self._clock.now() + self.player.profile.drives.period)
             self._collect_rest()
+        if self.fault is not None:
+            self.records.keep(self.fault.problems[0])
+        self.records.end()
 
     def _collect_rest(self) -> None:
         """What a machine that is being stopped has executed; a further fault changes nothing."""
@@ -212,9 +242,14 @@ class Acts:
         if state is JobState.FAULT:
             self._lines.end()
             self._collect_rest()
+            if self.player.link.state is not LinkState.STOPPING:
+                known = self.fault.problems[0] if self.fault is not None else None
+                self.records.keep(known or Problem("emergency-stop", self.message))
             return
         self._lines.turn(state)
         rest = self.player.turn()
+        if state is JobState.PRINTING and (alarm := self.records.alarm(self._clock.now())) is not None:
+            self._alarmed(alarm)
         if self._count is not None:
             self._count.plan = self.player.plan_time(self._count.plan)
         if rest is None:
@@ -232,6 +267,14 @@ class Acts:
             if state is JobState.RESUMING:
                 self._go_on()
             self._happened(Word.RESTED, self.message)
+
+    def _alarmed(self, alarm: Alarm) -> None:
+        """A watchdog: raises DriveError for what must stop at once, holds for the rest."""
+        if alarm.reaction is Reaction.STOP:
+            raise DriveError(alarm.problem)
+        self._telling.add("problem", alarm.problem.message, alarm.problem)
+        self._happened(Word.HOLD, alarm.problem.message)
+        self.player.hold()
 
     def _rested(self, rest: Rest, state: JobState) -> None:
         """The program stands."""

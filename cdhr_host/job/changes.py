@@ -15,6 +15,7 @@ import numpy as np
 
 from cdhr_host.errors import DriveError, JobError, MotionError, Problem
 from cdhr_host.job.feeder import Feeder
+from cdhr_host.motion.flow import UNBOUNDED
 from cdhr_host.motion.playback import Pace, landing, ramp, steady
 from cdhr_host.motion.ramps import WAITS, Ahead, choices, longest
 from cdhr_host.pipeline.course import Course
@@ -146,7 +147,10 @@ class Changes:
         course.plan(last)
         stop = course.stop()
         plan = course.rows(math.floor(u), min(last, stop.tick) if stop else last)
-        return Ahead(plan, self._before(first, plan) if before is None else before, course.nozzle, profile)
+        air = course.staircase.limits.flow if profile.job.hold == "clean" else UNBOUNDED
+        return Ahead(
+            plan, self._before(first, plan) if before is None else before, course.nozzle, profile, air
+        )
 
     def _before(self, first: int, plan: Setpoints) -> Setpoints:
         before = self._feeder.before(first)

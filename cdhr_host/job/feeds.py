@@ -103,7 +103,7 @@ class Feeds:
         return score.last.course.staircase.feed_override == self._override()
 
     def _override(self) -> FeedOverride:
-        return FeedOverride(max(self._wanted, 1.0), self._flow if self._wanted > 1.0 else 1.0)
+        return FeedOverride(max(self._wanted, 1.0), max(self._flow, 1.0) if self._wanted > 1.0 else 1.0)
 
     def _joined(self) -> bool:
         """Join the right course soon; whether that was possible, or is the case already."""

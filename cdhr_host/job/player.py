@@ -213,6 +213,11 @@ class Player:
         self.staircase, self._course, self.aside = aside.staircase, aside.course, None
         self.kind = Kind.PROGRAM
 
+    def recover(self, aside: Aside) -> None:
+        """Stand where the machine stands, with a program to be gone on with from elsewhere."""
+        self.aside = aside
+        self.feeder.next_tick = max(self.feeder.next_tick, 1)
+
     def leave(self) -> None:
         """What was set aside is not gone on with."""
         if self.aside is not None:
@@ -278,13 +283,13 @@ class Player:
 
     def hold(self) -> None:
         """Come to rest on the path."""
-        late = 0.0
-        self.changes.pace(0.0, late=late)
+        clean = self.profile.job.hold == "clean" and self.kind is Kind.PROGRAM
+        self.changes.pace(0.0, late=self.staircase.rig.air.change_lead if clean else 0.0)
 
     def go_on(self) -> None:
         """From rest back to speed."""
         self.feeds.choose_at_rest()
-        self.changes.go_on(self.feeds.rate)
+        self.changes.go_on(self.feeds.rate, prime=self.profile.job.resume_prime)
 
     def override(self, feed: float | None, flow: float | None, *, moving: bool) -> None:
         """Other shares of feed and flow, at once while a program moves. Raises MotionError."""

@@ -21,6 +21,8 @@ from cdhr_host.job.acts import Acts
 from cdhr_host.job.jogging import Jogging
 from cdhr_host.job.player import Observer, Player
 from cdhr_host.job.program import Program, ProgramFile, proven
+from cdhr_host.job.recorder import Recorder
+from cdhr_host.job.recovery import Recovery
 from cdhr_host.job.states import QUIET, Word, after
 from cdhr_host.job.surface import JobState, LineFeed, Listener, Reply, Status
 from cdhr_host.job.telling import Telling
@@ -43,7 +45,14 @@ class Printer:
     nothing happens but in ``turn``.
     """
 
-    def __init__(self, link: MachineLink, clock: Clock, *, executor: Executor | None = None) -> None:
+    def __init__(
+        self,
+        link: MachineLink,
+        clock: Clock,
+        *,
+        executor: Executor | None = None,
+        recorder: Recorder | None = None,
+    ) -> None:
         self._clock = clock
         self._lock = threading.RLock()
         self._wake = threading.Event()
@@ -53,7 +62,7 @@ class Printer:
         self._asked: deque[Callable[[], None]] = deque()
         self._state = JobState.IDLE
         self._telling = Telling()
-        self._acts = Acts(Player(link), clock, self._telling, self._happened)
+        self._acts = Acts(Player(link), clock, self._telling, self._happened, recorder)
         self._typed = Typed(self._acts.player)
         self._jogging = Jogging(self._acts.player, clock, self._limit_met)
 
@@ -108,6 +117,16 @@ class Printer:
             self._acts.check_start()
             self._say(Word.START)
         self._ask(self._acts.start)
+
+    def recover(self, recovery: Recovery, *, goes_on: str = "") -> None:
+        """READY -> HELD, in the middle of the program: ``resume`` goes there, then on.
+
+        ``goes_on`` names the journal of the print that was interrupted.
+        """
+        with self._lock:
+            self._acts.check_busy()
+            self._say(Word.RECOVER, f"line {recovery.line}")
+        self._ask(lambda: self._acts.recover(recovery, goes_on))
 
     def open_stream(self, name: str) -> LineFeed:
         """Print lines as a client sends them."""

@@ -15,6 +15,7 @@ class Word(Enum):
     REFUSED = "refused"
     UNLOAD = "unload"
     START = "start"
+    RECOVER = "recover"
     OPEN = "lines"
     HOLD = "hold"
     PAUSED = "pause"
@@ -33,6 +34,7 @@ ASKED: Final = frozenset(
         Word.LOAD,
         Word.UNLOAD,
         Word.START,
+        Word.RECOVER,
         Word.OPEN,
         Word.HOLD,
         Word.RESUME,
@@ -50,6 +52,7 @@ TABLE: Final[dict[tuple[S, Word], S]] = {
     (S.PROVING, Word.REFUSED): S.IDLE,
     (S.PROVING, Word.ABORT): S.IDLE,
     (S.READY, Word.START): S.PRINTING,
+    (S.READY, Word.RECOVER): S.HELD,
     (S.DONE, Word.START): S.PRINTING,
     (S.PRINTING, Word.HOLD): S.HOLDING,
     (S.PRINTING, Word.PAUSED): S.HELD,

@@ -1,0 +1,84 @@
+"""What a printer has recorded, where it has a recorder at all."""
+
+from contextlib import suppress
+
+from cdhr_host.errors import JobError, Problem
+from cdhr_host.job.player import Kind, Player
+from cdhr_host.job.program import ProgramFile
+from cdhr_host.job.recorder import Plan, Recorder
+from cdhr_host.job.surface import Event, JobState
+from cdhr_host.job.telling import Telling
+from cdhr_host.job.watchdogs import Alarm
+from cdhr_host.values import Feedback, Setpoints
+
+
+class Records:
+    """Between a player, what is told, and a recorder; everything from the printer's thread."""
+
+    def __init__(self, player: Player, recorder: Recorder | None, telling: Telling) -> None:
+        self._player = player
+        self._recorder = recorder
+        self._telling = telling
+        self._kept = False
+        self._alarm: Alarm | None = None
+        if recorder is not None:
+            player.observers.append(self._executed)
+            telling.listen(self._heard)
+
+    def begin(self, file: ProgramFile, *, goes_on: str = "") -> None:
+        """A print begins. Raises JobError where no journal can be written."""
+        if self._recorder is not None:
+            self._recorder.begin(file, goes_on=goes_on)
+
+    def alarm(self, now: float) -> Alarm | None:
+        """What a watchdog has found since the last call."""
+        if self._recorder is None:
+            return None
+        found, self._alarm = self._alarm, None
+        feeder = self._player.feeder
+        waiting = feeder.link.free > 0 and not feeder.standing
+        return found or self._recorder.look(now, feeder.next_tick, waiting=waiting)
+
+    def keep(self, why: Problem) -> None:
+        """Write the black box, once until ``acknowledged``."""
+        if self._recorder is None or self._kept:
+            return
+        self._kept = True
+        try:
+            path = self._recorder.keep(why)
+        except JobError as error:
+            self._telling.add("problem", error.problems[0].message, error.problems[0])
+            return
+        self._telling.add("message", f"the last minute is in {path}: cdhr plot draws it")
+
+    def acknowledged(self) -> None:
+        """The next fault has a black box of its own."""
+        self._kept = False
+
+    def end(self) -> None:
+        """Nothing more will be recorded."""
+        if self._recorder is not None:
+            self._recorder.end()
+
+    def _executed(self, rows: Setpoints, feedback: Feedback) -> None:
+        assert self._recorder is not None
+        alarm = self._recorder.executed(rows, feedback, self._plan())
+        self._alarm = self._alarm or alarm
+
+    def _plan(self) -> Plan | None:
+        """Where in the program the machine is, and how far what the link may hold could bring it."""
+        player = self._player
+        if player.kind is not Kind.PROGRAM or (now := player.feeds.plan_time()) is None:
+            return None
+        held = player.link.free + player.feeder.buffered
+        return Plan(now, now + held * max(player.feed, 1.0))
+
+    def _heard(self, event: Event) -> None:
+        assert self._recorder is not None
+        if event.kind != "state":
+            self._recorder.event(event.kind, event.text)
+            return
+        with suppress(JobError):  # a full disk has an alarm of its own, and must not end the telling
+            self._recorder.turned(event.status.state.value, event.text)
+        if event.status.state is JobState.DONE:
+            self._recorder.end()

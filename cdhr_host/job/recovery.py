@@ -1,0 +1,219 @@
+"""Where an interrupted print goes on: from its journal, its program's plan and where the machine stands.
+
+The plan of a file is the same each time it is made, so a tick of it is a place. The journal says
+which tick was executed last (or later, at most as far as the drives had been fed). Between these
+two the nozzle came to rest; the encoders say where. When a link comes to rest by itself, the air is
+off from the first tick of its stop on, so the bead ended before the nozzle did: at the tick from
+which such a stop ends where the nozzle stands.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from cdhr_host.errors import JobError, Problem
+from cdhr_host.job.aside import Aside
+from cdhr_host.job.journal import Executed, Journal
+from cdhr_host.job.making import Making
+from cdhr_host.job.program import Program
+from cdhr_host.motion.hold import rows_needed
+from cdhr_host.motion.leg import Leg
+from cdhr_host.motion.playback import Pace
+from cdhr_host.motion.sampling import Timed
+from cdhr_host.pipeline import Staircase
+from cdhr_host.pipeline.course import Course
+from cdhr_host.pipeline.rig import Rig
+from cdhr_host.pipeline.score import Gain, Part, Score
+from cdhr_host.pipeline.tape import Tape
+from cdhr_host.units import MM
+from cdhr_host.values import Array, Setpoints
+
+SAME: Final = 0.02 * MM
+"""how far the journal's nozzle may be from the plan's"""
+NEAR: Final = 0.3 * MM
+"""how far the nozzle may stand from the path and still count as on it"""
+BACK: Final = 60.0
+"""s of plan looked back over for the overlap"""
+Stops = Callable[[Setpoints], Setpoints]
+"""rows ahead -> the rows a link plays instead when it comes to rest by itself"""
+
+
+@dataclass(frozen=True, slots=True)
+class Recovery:
+    """Where and how a print goes on."""
+
+    tick: float
+    """of the plan at 100 %, at which it goes on"""
+    line: int
+    nozzle_G: Array
+    """(3,) m, there"""
+    bead: float
+    """tick at which the bead ended, at the earliest"""
+    rested: float
+    """tick of the plan at which the nozzle came to rest"""
+    overlap: float
+    """m of path laid once more, at most"""
+    away: float
+    """m from the path to where the nozzle stands"""
+    sure: bool
+    """whether the bead's end is known, and not only bounded"""
+
+
+class Resuming:
+    """A program, and the way to a place in it."""
+
+    def __init__(self, program: Program, rig: Rig) -> None:
+        self._program = program
+        self._rig = rig
+
+    def found(self, journal: Journal, measured_G: Array, stops: Stops, overlap: float) -> Recovery:
+        """From a journal and (3,) m where the nozzle stands; ``overlap`` m is what the operator wants.
+
+        Raises JobError where the journal is not of this plan, or the nozzle not near it.
+        """
+        last = journal.executed
+        if last is None:
+            raise _refusal("nothing of this print was executed", "cdhr stream FILE begins it anew")
+        course = self._course(max(last.plan_tick - BACK / self._period, 0.0))
+        self._check_plan(course, last)
+        bead, rested, away, sure = self._rest(course, journal, last, measured_G, stops)
+        tick = self._before(course, bead, overlap)
+        doubled = self._length(course, tick, rested if sure else max(rested, bead))
+        return Recovery(
+            tick, self._line(course, tick), self._place(course, tick), bead, rested, doubled, away, sure
+        )
+
+    def at_line(self, line: int) -> Recovery:
+        """From the first tick of a line on. Raises JobError for a line that moves nothing."""
+        course = self._course(0.0)
+        while (tick := _first_of(course, line)) is None:
+            if course.over:
+                raise _refusal(
+                    f"no motion at line {line} or after it", f"{self._program.file.name} ends before"
+                )
+            course.skip(course.staircase.tick + 1)
+        return Recovery(tick, self._line(course, tick), self._place(course, tick), tick, tick, 0.0, 0.0, True)
+
+    def aside(self, tick: float) -> Aside:
+        """The program, standing at a tick of its plan, to be gone on with."""
+        course = self._course(tick)
+        pace = Pace.of(tick=0, u=tick, rate=0.0)
+        making = Making(Score(course.staircase, (Part(0, course, pace),), Gain()), 1)
+        making.ended = True
+        return Aside(making, course, course, course.staircase, 0, self._place(course, tick))
+
+    @property
+    def _period(self) -> float:
+        return self._rig.profile.drives.period
+
+    def _course(self, tick: float) -> Course:
+        """The program's plan, from a tick on."""
+        staircase = Staircase(self._rig.profile, rig=self._rig)
+        course = Course(staircase.fork(), Tape(staircase.commands(self._program.file.chunks())))
+        course.skip(math.floor(tick))
+        course.plan(math.ceil(tick) + 1)
+        return course
+
+    def _check_plan(self, course: Course, last: Executed) -> None:
+        """Raises JobError where the plan is not the one the journal was written by."""
+        course.plan(math.ceil(last.plan_tick) + 1)
+        away = float(np.linalg.norm(self._place(course, last.plan_tick) - np.array(last.nozzle_mm) * MM))
+        if away > SAME:
+            raise _refusal(
+                f"the journal's nozzle is {away / MM:.3f} mm from the plan's (limit {SAME / MM:g} mm)",
+                "file, profile and version of this program must be those of the interrupted print; "
+                "--from-layer goes on without a journal's place",
+            )
+
+    def _rest(
+        self, course: Course, journal: Journal, last: Executed, measured_G: Array, stops: Stops
+    ) -> tuple[float, float, float, bool]:
+        """Ticks at which the bead ended and the nozzle rests, m from the path, and whether that is sure."""
+        fed = max(journal.fed.plan_tick if journal.fed else last.plan_tick, last.plan_tick)
+        rows = self._rows(course, last.plan_tick, fed)
+        away = np.linalg.norm(rows.nozzle_G - measured_G, axis=1)
+        nearest = int(away.argmin())
+        distance, first = float(away[nearest]), int(rows.tick[0])
+        rested = max(float(first + nearest), last.plan_tick)
+        if distance > NEAR:
+            raise _refusal(
+                f"the nozzle stands {distance / MM:.2f} mm from the path it was on (limit {NEAR / MM:g} mm)",
+                "if it was moved since, say --moved; if not, reference the machine",
+            )
+        if journal.state == "held":
+            return last.plan_tick, last.plan_tick, distance, True
+        begin = _stop_begin(rows, nearest, stops)
+        if begin is None:
+            return last.plan_tick, rested, distance, False
+        return max(float(first + begin), last.plan_tick), rested, distance, True
+
+    def _rows(self, course: Course, first: float, last: float) -> Setpoints:
+        """The plan's rows over what may have been executed, and what a stop may still have played."""
+        end = math.ceil(last) + rows_needed(self._rig.profile)
+        course.plan(end + 1)
+        stop = course.stop()
+        return course.rows(math.floor(first), end if stop is None else min(end, stop.tick))
+
+    def _before(self, course: Course, tick: float, way: float) -> float:
+        """The tick this much path before another; that of the last rest at the most."""
+        u = np.append(np.arange(max(tick - BACK / self._period, course.kept_from), tick), tick)
+        gone = self._gone(course, u)
+        return float(u[int(np.searchsorted(gone, gone[-1] - way, side="right")) - 1]) if len(u) > 1 else tick
+
+    def _length(self, course: Course, first: float, last: float) -> float:
+        """m of path between two ticks."""
+        return float(self._gone(course, np.append(np.arange(first, last), last))[-1])
+
+    def _gone(self, course: Course, u: Array) -> Array:
+        """(N,) ticks -> (N,) m of path since the first."""
+        steps = np.diff(course.nozzle(u).position_G, axis=0)
+        return np.concatenate(([0.0], np.cumsum(np.linalg.norm(steps, axis=1))))
+
+    def _place(self, course: Course, tick: float) -> Array:
+        place: Array = course.nozzle(np.array([tick])).position_G[0]
+        return place
+
+    def _line(self, course: Course, tick: float) -> int:
+        return int(course.nozzle(np.array([tick])).line[0])
+
+
+def _stop_begin(rows: Setpoints, rested: int, stops: Stops) -> int | None:
+    """Row from which a link's own stop ends at a row, by halving; None where none does."""
+    low, high = 0, rested
+    while low < high:
+        middle = (low + high) // 2
+        if _ends_at(rows, middle, stops) < rested:
+            low = middle + 1
+        else:
+            high = middle
+    near = [k for k in (low - 1, low) if k >= 0 and abs(_ends_at(rows, k, stops) - rested) <= 1]
+    return near[0] if near else None
+
+
+def _ends_at(rows: Setpoints, begin: int, stops: Stops) -> int:
+    """Row of the plan nearest to where a stop from another row on ends."""
+    end = stops(rows[begin:]).nozzle_G[-1]
+    return begin + int(np.linalg.norm(rows.nozzle_G[begin:] - end, axis=1).argmin())
+
+
+def _first_of(course: Course, line: int) -> float | None:
+    """The first tick of a line or one after it, where it is planned."""
+    for placed in course.placed():
+        step = placed.step
+        if (
+            isinstance(step, Timed)
+            and isinstance(step.stretch, Leg)
+            and step.stretch.segments.line[-1] >= line
+        ):
+            tick = np.arange(step.ticks.start, step.ticks.stop)
+            found = np.flatnonzero(step.track(tick).line >= line)
+            if len(found):
+                return float(tick[found[0]])
+    return None
+
+
+def _refusal(message: str, hint: str) -> JobError:
+    return JobError(Problem("resume", message, hint=hint))

@@ -1,0 +1,188 @@
+"""A print that was cut off goes on: everything once, the seam within what is stated, or a reason why not."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from stepped import Stepped
+
+from cdhr_host.drives import LinkState, Loopback
+from cdhr_host.errors import JobError
+from cdhr_host.job.journal import Journal, read_journal
+from cdhr_host.job.printer import Printer
+from cdhr_host.job.program import Program, ProgramFile, proven
+from cdhr_host.job.recorder import Recorder
+from cdhr_host.job.recovery import Recovery, Resuming
+from cdhr_host.job.surface import JobState
+from cdhr_host.pipeline import Staircase, open_profile
+from cdhr_host.pipeline.rig import Rig
+from cdhr_host.units import MM
+from cdhr_host.values import Feedback, Setpoints
+
+PROFILE = open_profile("paper")
+RING = Path(__file__).parents[2] / "gcode" / "paper_ring_double.gcode"
+RIG = Rig.from_profile(PROFILE)
+OVERLAP = 2.0 * MM
+
+
+@pytest.fixture(scope="module")
+def program() -> Program:
+    return proven(ProgramFile(RING), PROFILE)
+
+
+@pytest.fixture(scope="module")
+def whole() -> Setpoints:
+    with RING.open("rb") as text:
+        parts = list(Staircase(PROFILE).setpoints(iter(lambda: text.read(1 << 16), b"")))
+    return Setpoints(
+        *(np.concatenate([getattr(p, n) for p in parts]) for n in Setpoints.__dataclass_fields__)
+    )
+
+
+class Machine:
+    """One simulated machine, and the printers that come and go before it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.clock = Stepped()
+        self.link = Loopback(PROFILE, self.clock)
+        self.folder = folder
+        self.laid: list[Setpoints] = []
+
+    def printer(self) -> Printer:
+        """A host process that has just begun."""
+        self.link.open()
+        printer = Printer(self.link, self.clock, recorder=Recorder(self.link, "paper", self.folder))
+        printer.observe(self._executed)
+        return printer
+
+    def _executed(self, rows: Setpoints, _: Feedback) -> None:
+        if (rows.flow > 0).any():
+            self.laid.append(rows[rows.flow > 0])
+
+    def run(self, printer: Printer, until: float = 1e9) -> JobState:
+        """Go on until a time of the clock, or the end."""
+        while self.clock.now() < until and printer.state not in (JobState.DONE, JobState.FAULT):
+            printer.turn()
+            self.clock.wait_until(self.clock.now() + 0.05)
+        return printer.state
+
+    def killed(self) -> None:
+        """The host is gone: the far side plays what it has, comes to rest by itself, and waits."""
+        self.link.stop()
+        for _ in range(200):
+            self.clock.wait_until(self.clock.now() + 0.05)
+            if self.link.state is not LinkState.STOPPING:
+                break
+            self.link.feedback()
+        self.link.close()
+
+    @property
+    def journal(self) -> Journal:
+        return read_journal(max(self.folder.glob("*.journal")))
+
+
+def interrupted(tmp_path: Path, program: Program, at: float, *, hold: bool = False) -> Machine:
+    machine = Machine(tmp_path)
+    printer = machine.printer()
+    printer.adopt(program)
+    printer.start()
+    machine.run(printer, at)
+    if hold:
+        printer.hold()
+        while printer.state is not JobState.HELD:
+            machine.run(printer, machine.clock.now() + 0.1)
+        printer.close()
+        machine.link.close()
+    else:
+        machine.killed()
+    return machine
+
+
+def resumed(machine: Machine, program: Program) -> Recovery:
+    printer = machine.printer()
+    journal = machine.journal
+    recovery = Resuming(program, RIG).found(
+        journal, printer.status().nozzle_G, machine.link.stop_rows, OVERLAP
+    )
+    printer.adopt(program)
+    printer.recover(recovery, goes_on=str(journal.path))
+    printer.turn()
+    assert printer.state is JobState.HELD
+    printer.resume()
+    assert machine.run(printer) is JobState.DONE, printer.status()
+    printer.close()
+    machine.link.close()
+    return recovery
+
+
+def checked(machine: Machine, whole: Setpoints, recovery: Recovery) -> None:
+    """All that the program lays is laid, and no more than the stated overlap twice."""
+    laid = np.concatenate([rows.nozzle_G for rows in machine.laid])
+    wanted = whole.nozzle_G[whole.flow > 0]
+    away = [np.linalg.norm(laid - place, axis=1).min() for place in wanted[::5]]
+    assert max(away) < 0.4 * MM
+    period = PROFILE.drives.period
+    volume = sum(float(rows.flow.sum()) for rows in machine.laid) * period
+    asked = float(whole.flow.sum()) * period
+    per_metre = asked / program_length(whole)
+    assert volume - asked < (recovery.overlap + 1.0 * MM) * per_metre
+    assert volume - asked > -0.1 * MM * per_metre
+
+
+def program_length(rows: Setpoints) -> float:
+    steps = np.linalg.norm(np.diff(rows.nozzle_G, axis=0), axis=1)
+    return float(steps[rows.flow[1:] > 0].sum())
+
+
+@pytest.mark.parametrize("at", [3.0, 11.3, 20.02, 27.7, 40.0])
+def test_a_killed_print_goes_on(tmp_path: Path, program: Program, whole: Setpoints, at: float) -> None:
+    machine = interrupted(tmp_path, program, at)
+    recovery = resumed(machine, program)
+    assert recovery.sure
+    assert recovery.overlap < 6.0 * MM
+    checked(machine, whole, recovery)
+    assert machine.journal.finished
+
+
+def test_a_held_print_goes_on(tmp_path: Path, program: Program, whole: Setpoints) -> None:
+    machine = interrupted(tmp_path, program, 15.0, hold=True)
+    recovery = resumed(machine, program)
+    assert recovery.sure
+    assert recovery.overlap <= OVERLAP + 0.2 * MM
+    checked(machine, whole, recovery)
+
+
+def test_a_machine_that_was_moved_is_refused(tmp_path: Path, program: Program) -> None:
+    machine = interrupted(tmp_path, program, 15.0)
+    machine.link.open()
+    measured = RIG.standing(machine.link.slider)[0] + np.array([0.0, 0.0, 5.0]) * MM
+    with pytest.raises(JobError, match=r"stands 5\.0"):
+        Resuming(program, RIG).found(machine.journal, measured, machine.link.stop_rows, OVERLAP)
+
+
+def test_another_plan_is_refused(tmp_path: Path, program: Program) -> None:
+    machine = interrupted(tmp_path, program, 15.0)
+    machine.link.open()
+    slower = PROFILE.model_copy(
+        update={"limits": PROFILE.limits.model_copy(update={"acceleration_max": 0.2})}
+    )
+    other = Resuming(proven(ProgramFile(RING), slower), Rig.from_profile(slower))
+    with pytest.raises(JobError, match="from the plan's"):
+        other.found(machine.journal, RIG.standing(machine.link.slider)[0], machine.link.stop_rows, OVERLAP)
+
+
+def test_a_print_goes_on_at_a_line(tmp_path: Path, program: Program, whole: Setpoints) -> None:
+    machine = interrupted(tmp_path, program, 15.0)
+    printer = machine.printer()
+    recovery = Resuming(program, RIG).at_line(20)
+    first = int(np.argmax(whole.line >= 20))
+    assert recovery.line == 20
+    assert recovery.tick == pytest.approx(float(whole.tick[first]))
+    machine.laid.clear()
+    printer.adopt(program)
+    printer.recover(recovery)
+    printer.turn()
+    printer.resume()
+    assert machine.run(printer) is JobState.DONE
+    assert min(int(rows.line.min()) for rows in machine.laid) == 20
+    printer.close()
