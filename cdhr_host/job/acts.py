@@ -20,11 +20,10 @@ from cdhr_host.job.states import MOVING, Word
 from cdhr_host.job.surface import JobState, Status
 from cdhr_host.job.telling import Telling
 from cdhr_host.job.watchdogs import Alarm, Reaction
-from cdhr_host.units import MM
 from cdhr_host.values import Feedback, Setpoints
 
-LIFTS = (20.0 * MM, 10.0 * MM, 5.0 * MM)
-"""m, tried in this order after an abort"""
+LIFTS = (1.0, 0.5, 0.25)
+"""of the profile's lift, tried in this order after an abort"""
 Happen = Callable[[Word, str], None]
 
 
@@ -303,8 +302,11 @@ class Acts:
         """After an abort: up and away from the clay, if that can be done."""
         self._lines.end()
         self.player.over()
-        height = self.player.lift(LIFTS)
-        if not height:
+        wanted = self.player.profile.job.lift
+        height = self.player.lift([share * wanted for share in LIFTS]) if wanted else 0.0
+        if not wanted:
+            self._happened(Word.LIFTED, self.message)
+        elif not height:
             text = "no way straight up is free: the nozzle stays where it stopped"
             self._telling.add("message", text)
             self._happened(Word.LIFTED, text)

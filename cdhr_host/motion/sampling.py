@@ -118,6 +118,11 @@ class Timeline:
         """The first that is not taken yet."""
         return self._tick
 
+    @property
+    def now(self) -> float:
+        """s since the program's start at which the next stretch begins."""
+        return self._time
+
     def lay(self, stretch: Stretch) -> Timed:
         """The next stretch, from where the last one ended."""
         laid = self._add(stretch)

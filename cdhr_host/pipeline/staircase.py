@@ -16,13 +16,14 @@ from cdhr_host.motion.sampling import Stand, Timed, Timeline
 from cdhr_host.motion.shaping import Shaper
 from cdhr_host.pipeline.audit import Audit, on_bed
 from cdhr_host.pipeline.checked import Checked
+from cdhr_host.pipeline.drying import Layers, lifted, paused
 from cdhr_host.pipeline.leading import Leading
 from cdhr_host.pipeline.pushing import Pushing, lays
 from cdhr_host.pipeline.rig import Rig
 from cdhr_host.pipeline.shift import SAME, Shift, nozzle_standing, shift
 from cdhr_host.profile import Profile
 from cdhr_host.program import Interpreter, Modal
-from cdhr_host.values import Array, Command, Pause, Setpoints, ToolTrack
+from cdhr_host.values import Array, Command, Moves, Notice, Pause, Setpoints, ToolTrack
 
 __all__ = ["Checked", "Staircase"]
 
@@ -45,6 +46,8 @@ class Staircase:
         self._interpreter = Interpreter(profile, at_G=self.rig.cables.reference_G)
         self._offset = np.zeros(3)
         self._airless_since: int | None = 0
+        self._layers = Layers(profile.job.layer_time_min)
+        self._way_down: Moves | None = None
 
     @property
     def lines(self) -> int:
@@ -93,7 +96,7 @@ class Staircase:
 
     def commands(self, chunks: Iterable[bytes]) -> Iterator[Command]:
         """A text's commands, by the modal state of those before it."""
-        return self._interpreter.commands(chunks)
+        return paused(self._interpreter.commands(chunks), self.profile.job.pause_every_layers)
 
     def opened(self) -> Iterator[Shift]:
         """What comes before a text's first command."""
@@ -103,13 +106,54 @@ class Staircase:
 
     def settled(self, command: Command) -> Iterator[Timed]:
         """Stretches that a further command settles; all there are before a Pause."""
+        if self._way_down is not None and not isinstance(command, Notice):
+            yield from self._lowered()
         if self._airless_since is not None and lays(command):
             yield from self._awaited()
+        if isinstance(command, Pause):
+            yield from self._raised(command.line)
         for stretch in self._planner.stretches(command):
             yield self._timeline.lay(stretch)
         if isinstance(command, Pause):
             yield self._timeline.rest(self._planner.standing)
             self._airless_since = self.tick
+        yield from self._dried(command)
+
+    def _dried(self, command: Command) -> Iterator[Timed]:
+        """Stand where a layer that took too little time ends."""
+        if not self._layers.ends(command):
+            return
+        yield from self._brought_to_rest()
+        missing = self._layers.missing(self._timeline.now)
+        if missing > 0.0:
+            yield from self._raised(command.line)
+            yield from self._brought_to_rest()
+            standing = self._planner.standing
+            yield self._timeline.lay(Stand(standing.at_G, missing, 0.0, command.line, standing.number))
+            self._layers.waited(self._timeline.now)
+            yield from self._lowered()
+
+    def _raised(self, line: int) -> Iterator[Timed]:
+        """Go up from where the nozzle stands, if pauses lift."""
+        yield from self._brought_to_rest()
+        way = lifted(self._planner.standing.at_G, self.profile, line)
+        if way is not None:
+            up, self._way_down = way
+            for stretch in self._planner.stretches(up):
+                yield self._timeline.lay(stretch)
+
+    def _lowered(self) -> Iterator[Timed]:
+        """Back down to where it was raised."""
+        if self._way_down is not None:
+            yield from self._brought_to_rest()
+            for stretch in self._planner.stretches(self._way_down):
+                yield self._timeline.lay(stretch)
+            self._way_down = None
+            yield from self._brought_to_rest()
+
+    def _brought_to_rest(self) -> Iterator[Timed]:
+        for stretch in self._planner.close():
+            yield self._timeline.lay(stretch)
 
     @property
     def drawn(self) -> float:
@@ -123,8 +167,7 @@ class Staircase:
 
     def _awaited(self) -> Iterator[Timed]:
         """Stand before the first clay for as long as the air needs to be ready for it."""
-        for stretch in self._planner.close():
-            yield self._timeline.lay(stretch)
+        yield from self._brought_to_rest()
         assert self._airless_since is not None
         missing = self.rig.air.start_lead - (self.tick - self._airless_since - 2) * self._period
         self._airless_since = None
@@ -134,8 +177,8 @@ class Staircase:
 
     def closed(self, *, ends: bool) -> Iterator[Timed | Shift]:
         """What comes after a text's last command, up to rest."""
-        for stretch in self._planner.close():
-            yield self._timeline.lay(stretch)
+        yield from self._lowered()
+        yield from self._brought_to_rest()
         yield self._timeline.rest(self._planner.standing)
         self._offset = self._wanted()
         if ends and self._at_reference():
@@ -148,6 +191,7 @@ class Staircase:
         """
         other = copy.copy(self)
         other._planner, other._timeline = self._planner.fork(override), copy.copy(self._timeline)
+        other._layers = copy.copy(self._layers)
         return other
 
     def restore(self, modal: Modal) -> None:

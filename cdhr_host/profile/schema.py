@@ -157,7 +157,7 @@ class Extruder(Section):
 
 
 class Job(Section):
-    """[job]: how a print is held."""
+    """[job]: how a print is held, paused and given up."""
 
     hold: Annotated[
         Literal["clean", "prompt"],
@@ -165,6 +165,26 @@ class Job(Section):
             description="clean: a change of pace waits until the air can follow it; prompt: at once, the clay late"
         ),
     ] = "clean"
+    resume_prime: Annotated[
+        float,
+        key("resume_prime_ms", "clay pushed while standing before a held bead goes on", ge=0, le=6e4),
+        IN_MS,
+    ] = 0.0
+    lift: Annotated[
+        float,
+        key("lift_mm", "how far the nozzle goes up after an abort, and for pauses with a lift", ge=0, le=500),
+        IN_MM,
+    ] = 20.0 * MM
+    pauses_lift: Annotated[
+        bool, Field(description="the nozzle goes up by lift_mm for pauses and between layers that dry")
+    ] = False
+    pause_every_layers: Annotated[
+        int,
+        Field(description="layers after which a print pauses for an operator; 0 is never", ge=0, le=10_000),
+    ] = 0
+    layer_time_min: Annotated[
+        float, key("layer_time_min_s", "time a layer takes at least, so that it can dry", ge=0, le=86_400)
+    ] = 0.0
 
 
 class Bead(Section):
