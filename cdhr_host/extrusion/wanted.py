@@ -60,8 +60,9 @@ def wanted(flow: Array, since: int, law: PressureFlow, creep: float, gaps: Gaps)
     ramp = np.where(short, 1.0, _eased(ahead, gaps.restore))
     slow = np.minimum(creep, SLOW * _peak(flow, 2 * gaps.creeps))
     more = law.pressure(slow) - law.threshold if creep > 0.0 else 0.0
-    pressure = law.threshold * ramp + more * _nearing(ahead, gaps.creeps) ** RISING
-    pressure[flowing] = law.pressure(np.maximum(flow[flowing], slow[flowing]))
+    creeping = _until(flowing & (flow >= slow))
+    pressure = law.threshold * ramp + more * _nearing(creeping, gaps.creeps) ** RISING
+    pressure[flowing] = np.maximum(law.pressure(flow[flowing]), pressure[flowing])
     opened = flowing | near | short
     return Wanted(np.where(opened, pressure, 0.0), opened, ago)
 

@@ -32,6 +32,8 @@ class FlowLimits:
     """(M,) m³/s, ascending"""
     change: Array = field(default_factory=_none)
     """(M,) m³/s², the greatest change of flow on the way to each of these and back to rest"""
+    steepness: float = math.inf
+    """1/s: the change of that change, over it, with which these were found"""
     rests: bool = False
     """whether the nozzle rests where the clay per metre changes"""
 
@@ -47,8 +49,9 @@ class FlowLimits:
             return np.asarray(np.minimum(1.0, np.where(clay > 0.0, allowed / (clay * acceleration), 1.0)))
 
     def slowest(self, flow: float) -> float:
-        """m³/s -> s: the time its greatest change takes from nothing to a flow."""
-        return flow / float(np.interp(flow, self.flow, self.change))
+        """m³/s -> s: what the steepest ramp to a flow would take if it were as steep all the way."""
+        change = float(np.interp(flow, self.flow, self.change))
+        return flow / min(change, math.sqrt(flow * change * self.steepness)) if flow > 0.0 else 0.0
 
     def jumps(self, clay: Array, before: float) -> Flags:
         """(M,) whether the clay per metre changes where each segment begins; ``before`` them it was that."""

@@ -44,7 +44,7 @@ def flow_limits(air: AirModel, steepness: float) -> FlowLimits:
         return FlowLimits(greatest, rests=air.leads)
     flow = greatest * np.arange(1, GRID + 1) / GRID
     change = np.array([_hardest(air, each, steepness) for each in flow.tolist()])
-    return FlowLimits(greatest, flow, np.minimum.accumulate(change[::-1])[::-1], rests=True)
+    return FlowLimits(greatest, flow, np.minimum.accumulate(change[::-1])[::-1], steepness, rests=True)
 
 
 def _hardest(air: AirModel, flow: float, steepness: float) -> float:
