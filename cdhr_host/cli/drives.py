@@ -99,17 +99,25 @@ def reset(node: NodeId, *, drives: Url) -> None:
 @app.command(epilog=examples("cdhr drives reference --drives socketcan:can0"))
 def reference(*, drives: Url, profile: ProfileName = "paper") -> None:
     """The machine stands at its reference pose: remember it for each drive's serial number."""
+    from cdhr_host.drives.reference import default_store
+
     with _link(drives, profile) as link:
         link.set_reference()
-    emit("reference kept for six drives")
+    emit(f"reference kept for six drives in {default_store()}")
 
 
 @app.command(epilog=examples("cdhr drives home --drives socketcan:can0"))
 def home(*, drives: Url, profile: ProfileName = "paper") -> None:
     """Home every slider in turn, with little torque. The machine moves."""
+    machine = open_machine(profile)
+    if machine.canopen.reference != "homing":
+        raise Refusal(
+            f"cdhr: error: the drives of {profile} are not homed: [canopen] reference is "
+            f"'{machine.canopen.reference}'\nhint: cdhr drives reference, or reference = \"homing\""
+        )
     with _link(drives, profile) as link:
         link.home()
-    emit("six sliders homed")
+    emit("six sliders homed, until the drives lose their power")
 
 
 @contextmanager

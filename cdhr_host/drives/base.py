@@ -41,6 +41,15 @@ class BufferedLink:
         """Who has no cycles of its own is never late."""
         return None
 
+    @property
+    def referenced(self) -> bool:
+        """Absolute encoders know the reference pose."""
+        return True
+
+    def home(self) -> None:
+        """Nothing to find: the machine knows its reference pose."""
+        self._expect(LinkState.OPEN, LinkState.STOPPED)
+
     def stop_rows(self, ahead: Setpoints) -> Setpoints:
         """What is played instead of ``ahead`` once the link stops."""
         return path_true_stop(ahead, self.profile)

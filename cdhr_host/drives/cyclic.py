@@ -17,15 +17,15 @@ import numpy as np
 from cdhr_host.drives.base import TAKING, BufferedLink
 from cdhr_host.drives.canopen.axis import Axis
 from cdhr_host.drives.canopen.bus import Bus
-from cdhr_host.drives.canopen.homing import home
 from cdhr_host.drives.canopen.machine import DEPTH, CanopenMachine
 from cdhr_host.drives.canopen.port import Port
+from cdhr_host.drives.canopen.referencing import Referencing
 from cdhr_host.drives.canopen.scaling import Scaling
 from cdhr_host.drives.checks import check_standing
 from cdhr_host.drives.clock import Clock
 from cdhr_host.drives.faults import fault
 from cdhr_host.drives.link import LinkState
-from cdhr_host.drives.reference import ReferenceStore, unreferenced
+from cdhr_host.drives.reference import ReferenceStore
 from cdhr_host.drives.timing import CycleTiming
 from cdhr_host.drives.watch import first_fault, underrun
 from cdhr_host.errors import DriveError, Problem
@@ -60,7 +60,7 @@ class CyclicLink(BufferedLink):
         self._connect = connect
         self._machine: CanopenMachine | None = None
         self._clock = clock
-        self._store = store
+        self._reference = Referencing(profile, store)
         self._scaling = Scaling(profile)
         self._flying: deque[_Sent | None] = deque()
         self._held: Ints = np.zeros(6, dtype=np.int64)
@@ -68,7 +68,6 @@ class CyclicLink(BufferedLink):
         self._rested_at: float | None = None
         self._pressure = 0.0
         self._playing = False
-        self._homed = False
         self._planner: ThreadPoolExecutor | None = None
         self._planning: Future[Setpoints] | None = None
 
@@ -107,7 +106,6 @@ class CyclicLink(BufferedLink):
         """CLOSED -> OPEN: bring-up."""
         self._expect(LinkState.CLOSED)
         self._forget()
-        self._homed = False
         self._scaling = Scaling(self.profile)
         port = self._connect()
         try:
@@ -117,12 +115,14 @@ class CyclicLink(BufferedLink):
             port.close()
             raise
         self._machine, self._planner = machine, ThreadPoolExecutor(1, "stop")
+        self._reference.adopt(machine)
+        self._scaling = Scaling(self.profile, self._reference.zero)
         self.state = LinkState.OPEN
 
     def arm(self, start: Array) -> None:
         """OPEN or STOPPED -> ARMED: enabled, holding (6,) m ``start``."""
         self._expect(LinkState.OPEN, LinkState.STOPPED)
-        self._check_referenced()
+        self._reference.check(self.machine)
         check_standing(start, self.slider)
         for axis in self.machine.axes:
             self._check_ready(axis)
@@ -192,19 +192,25 @@ class CyclicLink(BufferedLink):
         self._executed = []
         self.state = LinkState.CLOSED
 
+    @property
+    def referenced(self) -> bool:
+        """Whether every axis knows the reference pose."""
+        try:
+            self._reference.check(self.machine)
+        except DriveError:
+            return False
+        return True
+
     def home(self) -> None:
-        """Reference every axis by homing, mode 6, one slider at a time. OPEN only."""
+        """Reference every axis by homing, where the profile says so. OPEN or STOPPED only."""
         self._expect(LinkState.OPEN, LinkState.STOPPED)
-        home(self.machine)
-        self._homed = True
-        self.machine.watch.unreferenced.clear()
-        self._store.save(self.profile, self.machine.found.serials, np.zeros(6, dtype=np.int64))
+        self._reference.home(self.machine)
 
     def set_reference(self) -> None:
         """The machine stands at its reference pose: remember it for each drive's serial number."""
         self._expect(LinkState.OPEN, LinkState.STOPPED)
-        self._store.save(self.profile, self.machine.found.serials, self.machine.position)
-        self.machine.watch.unreferenced.clear()
+        self._reference.set(self.machine)
+        self._scaling = Scaling(self.profile, self._reference.zero)
 
     def turn(self) -> None:
         """One cycle: waits for it, listens, and tells the next setpoint."""
@@ -292,7 +298,7 @@ class CyclicLink(BufferedLink):
     def _trip(self, found: DriveError) -> None:
         if not self._note(found):
             return
-        self._forget_lost()
+        self._reference.forget_lost(self.machine)
         if self.state is LinkState.RUNNING:
             self._begin_stop()
         elif self.state is not LinkState.STOPPING:
@@ -351,23 +357,6 @@ class CyclicLink(BufferedLink):
         self.machine.release()
         for _ in range(3):
             self.turn()
-
-    def _check_referenced(self) -> None:
-        """DriveError with the next step unless every axis knows the reference pose."""
-        lost = sorted(axis + 1 for axis in self.machine.watch.unreferenced)
-        if lost:
-            raise unreferenced(lost)
-        mode = self.profile.canopen.reference
-        if mode == "stored":
-            self._scaling = Scaling(self.profile, self._store.zero(self.profile, self.machine.found.serials))
-        elif mode == "homing" and not self._homed:
-            raise unreferenced([1, 2, 3, 4, 5, 6])
-
-    def _forget_lost(self) -> None:
-        """A stored reference of an axis that cannot be trusted any more is stored no longer."""
-        lost = self.machine.watch.unreferenced
-        if lost and self.profile.canopen.reference == "stored":
-            self._store.forget(self.profile, [self.machine.found.serials[axis] for axis in lost])
 
     def _check_ready(self, axis: Axis) -> None:
         if axis.state.value.startswith("fault"):

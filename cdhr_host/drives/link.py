@@ -82,6 +82,18 @@ class MachineLink(Protocol):
         """CLOSED -> OPEN: find the drives."""
         ...
 
+    @property
+    def referenced(self) -> bool:
+        """Whether every axis knows the reference pose; ``arm`` refuses otherwise. Not while CLOSED."""
+        ...
+
+    def home(self) -> None:
+        """Find the reference pose by the drives' homing, one slider after the other. OPEN or STOPPED.
+
+        Nothing to do where the profile's drives know it by themselves. Raises DriveError.
+        """
+        ...
+
     def arm(self, start: Array) -> None:
         """OPEN or STOPPED -> ARMED: hold position, without a bump. (6,) m, where the sliders stand."""
         ...

@@ -22,22 +22,22 @@ class ReferenceStore:
     """Position units at the reference pose, kept in a file, one entry a drive."""
 
     def __init__(self, path: Path) -> None:
-        self._path = path
+        self.path = path
 
     def load(self) -> dict[str, int]:
         """All entries; raises DriveError for a damaged file."""
         try:
-            entries = json.loads(self._path.read_text(encoding="utf-8"))
+            entries = json.loads(self.path.read_text(encoding="utf-8"))
         except FileNotFoundError:
             return {}
         except (OSError, ValueError) as error:
             raise DriveError(
                 Problem(
-                    "reference", f"{self._path} cannot be used: {error}", hint="reference the drives again"
+                    "reference", f"{self.path} cannot be used: {error}", hint="reference the drives again"
                 )
             ) from error
         if not isinstance(entries, dict) or not all(type(value) is int for value in entries.values()):
-            raise DriveError(Problem("reference", f"{self._path} is not a table of references"))
+            raise DriveError(Problem("reference", f"{self.path} is not a table of references"))
         return entries
 
     def save(self, profile: Profile, serials: list[int], position: Ints) -> None:
@@ -48,8 +48,13 @@ class ReferenceStore:
 
     def forget(self, profile: Profile, serials: list[int]) -> None:
         """These drives are unreferenced from now on."""
-        gone = {_key(profile, serial) for serial in serials}
+        gone = {key(profile, serial) for serial in serials for key in (_key, _marked)}
         self._write({key: value for key, value in self.load().items() if key not in gone})
+
+    def known(self, profile: Profile, serials: list[int]) -> bool:
+        """Whether all these drives have a reference."""
+        entries = self.load()
+        return all(_key(profile, serial) in entries for serial in serials)
 
     def zero(self, profile: Profile, serials: list[int]) -> Ints:
         """(6,) position units at the reference pose; raises DriveError with the drives that have none."""
@@ -59,11 +64,22 @@ class ReferenceStore:
             raise unreferenced(absent)
         return np.array([entries[_key(profile, serial)] for serial in serials], dtype=np.int64)
 
+    def mark(self, profile: Profile, serials: list[int], marks: list[int]) -> None:
+        """Remember what homing left in each drive's volatile memory."""
+        entries = self.load()
+        entries |= {_marked(profile, s): mark for s, mark in zip(serials, marks, strict=True)}
+        self._write(entries)
+
+    def marked(self, profile: Profile, serials: list[int], marks: list[int]) -> bool:
+        """Whether all drives still have what homing left in them: they had power ever since."""
+        entries = self.load()
+        return all(entries.get(_marked(profile, s)) == mark for s, mark in zip(serials, marks, strict=True))
+
     def _write(self, entries: dict[str, int]) -> None:
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        fresh = self._path.with_suffix(".new")
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        fresh = self.path.with_suffix(".new")
         fresh.write_text(json.dumps(entries, indent=1, sort_keys=True) + "\n", encoding="utf-8")
-        fresh.replace(self._path)
+        fresh.replace(self.path)
 
 
 def unreferenced(axes: list[int]) -> DriveError:
@@ -74,3 +90,7 @@ def unreferenced(axes: list[int]) -> DriveError:
 
 def _key(profile: Profile, serial: int) -> str:
     return f"{profile.canopen.drive_vendor:08x}:{profile.canopen.drive_product:08x}:{serial}"
+
+
+def _marked(profile: Profile, serial: int) -> str:
+    return _key(profile, serial) + ":homed"

@@ -245,3 +245,45 @@ def test_homing_references_one_slider_after_the_other(tmp_path):
     assert all(drive.values[0x6061, 0] == 8 for drive in bench.far.drives)
     bench.link.arm(ZERO)
     bench.close()
+
+
+def test_homing_holds_until_the_drives_lose_their_power(tmp_path):
+    """A later session finds the marks homing left in the drives; a power cycle takes them away."""
+    store = ReferenceStore(tmp_path / "r.json")
+    bench = Bench(reference="homing", homing_method=35, store=store).opened()
+    assert not bench.link.referenced
+    bench.link.home()
+    assert bench.link.referenced
+    bench.link.close()
+    bench.link.open()
+    assert bench.link.referenced
+    bench.link.arm(ZERO)
+    bench.link.close()
+    bench.far.drives[2].reset(bench.clock.now())
+    bench.link.open()
+    assert not bench.link.referenced
+    with pytest.raises(DriveError, match="not referenced") as caught:
+        bench.link.arm(ZERO)
+    assert "cdhr drives home" in caught.value.problems[0].hint
+    bench.close()
+
+
+def test_homing_changes_nothing_where_the_drives_know_their_place():
+    bench = Bench(reference="drive").opened()
+    bench.link.home()
+    assert bench.link.referenced
+    assert bench.far.state.slider == pytest.approx(ZERO)
+    bench.close()
+
+
+def test_stored_reference_is_where_the_sliders_are_told_from(tmp_path):
+    store = ReferenceStore(tmp_path / "references.json")
+    bench = Bench(reference="stored", store=store)
+    bench.far.stand(np.full(6, 0.01))
+    bench.opened()
+    bench.link.set_reference()
+    assert bench.link.slider == pytest.approx(ZERO, abs=1e-6)
+    bench.link.close()
+    bench.link.open()
+    assert bench.link.slider == pytest.approx(ZERO, abs=1e-6)
+    bench.close()

@@ -76,6 +76,16 @@ class PumpedBridge:
         self._thread = threading.Thread(target=self._pump, name="bridge", daemon=True)
         self._thread.start()
 
+    @property
+    def referenced(self) -> bool:
+        """The bridge's encoders are absolute."""
+        return self._link.referenced
+
+    def home(self) -> None:
+        """Nothing to find."""
+        with self._lock:
+            self._link.home()
+
     def arm(self, start: Array) -> None:
         """OPEN or STOPPED -> ARMED."""
         with self._lock:

@@ -1,5 +1,6 @@
 """Homing, mode 6: one slider at a time, because cables couple the axes."""
 
+import secrets
 from collections.abc import Callable
 from typing import Final
 
@@ -14,10 +15,12 @@ from cdhr_host.drives.canopen.cia402 import (
 )
 from cdhr_host.drives.canopen.machine import CanopenMachine
 from cdhr_host.drives.canopen.setup import CSP, HOMING, IP, set_mode
-from cdhr_host.drives.canopen.verified import verified
+from cdhr_host.drives.canopen.verified import read, verified
 from cdhr_host.drives.faults import fault
 from cdhr_host.errors import DriveError
 
+MARK: Final = 0x6081
+"""profile velocity: cyclic modes do not use it, and it is lost with the drive's power"""
 DONE: Final = FOLLOWS_TARGET | TARGET_REACHED
 PATIENCE: Final = 120.0
 """s homing of an axis may take"""
@@ -32,6 +35,19 @@ def home(machine: CanopenMachine) -> None:
         finally:
             axis.word = SWITCH_ON
             _leave(machine, axis)
+
+
+def mark(machine: CanopenMachine) -> list[int]:
+    """Leave a number in each drive that only its power keeps; raises DriveError."""
+    marks = [secrets.randbelow(2**31 - 1) + 1 for _ in machine.axes]
+    for axis, value in zip(machine.axes, marks, strict=True):
+        verified(machine.bus, axis.node, MARK, 0, value)
+    return marks
+
+
+def marks(machine: CanopenMachine) -> list[int]:
+    """The numbers the drives have now; raises DriveError."""
+    return [read(machine.bus, axis.node, MARK) for axis in machine.axes]
 
 
 def _prepare(machine: CanopenMachine, axis: Axis) -> None:

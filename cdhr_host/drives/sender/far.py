@@ -222,6 +222,9 @@ class Sender:
     def _do_timing(self) -> object:
         return self._link.timing()
 
+    def _do_referenced(self) -> bool:
+        return self._link.referenced
+
     def _do_home(self) -> None:
         self._link.home()
 

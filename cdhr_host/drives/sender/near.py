@@ -154,6 +154,11 @@ class SenderLink:
         if self.state is not LinkState.FAULT:
             self._ask("stop")
 
+    @property
+    def referenced(self) -> bool:
+        """Whether every axis knows the reference pose."""
+        return bool(self._ask("referenced"))
+
     def home(self) -> None:
         """Reference every axis by homing, one after the other."""
         self._ask("home")

@@ -16,9 +16,9 @@ class Coupler(Node):
         self.values[0x6000, 1] = 3
         self.overridden_inputs: dict[int, int] = {}
 
-    def reset(self, now: float) -> None:
+    def reset(self, now: float, *, communication: bool = False) -> None:
         """Boot: all outputs 0."""
-        super().reset(now)
+        super().reset(now, communication=communication)
         self.values[0x6000, 1] = 3
 
     def synchronise(self) -> None:

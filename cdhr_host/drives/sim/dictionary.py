@@ -53,9 +53,11 @@ class Dictionary:
         self.overrides: dict[Key, int] = {}
         self.restore()
 
-    def restore(self) -> None:
-        """All values as they were at power-on."""
+    def restore(self, below: int = 0x10000) -> None:
+        """All values with an index below this as they were at power-on."""
         for key, entry in self.entries.items():
+            if key[0] >= below:
+                continue
             if isinstance(entry.default, str):
                 self.texts[key] = entry.default
             else:

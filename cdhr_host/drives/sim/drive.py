@@ -94,9 +94,9 @@ class Drive(Node):
             self._control()
             self._publish()
 
-    def reset(self, now: float) -> None:
+    def reset(self, now: float, *, communication: bool = False) -> None:
         """Boot: the axis falls into its brake."""
-        super().reset(now)
+        super().reset(now, communication=communication)
         self.drive_state, self._homed, self._speed = S.SWITCH_ON_DISABLED, False, 0.0
         self._publish()
 

@@ -10,6 +10,8 @@ from cdhr_host.drives.sim.sdo import SdoServer
 
 Frame = tuple[int, bytes]
 
+APPLICATION: Final = 0x2000
+"""index from which objects are the application's, not those of communication"""
 NEVER: Final = float("inf")
 
 
@@ -49,9 +51,9 @@ class Node:
         self._beat_at = NEVER
         self._host_heard: float | None = None
 
-    def reset(self, now: float) -> None:
-        """Begin to boot."""
-        self.dictionary.restore()
+    def reset(self, now: float, *, communication: bool = False) -> None:
+        """Begin to boot; where only communication is reset the application keeps its objects."""
+        self.dictionary.restore(APPLICATION if communication else 0x10000)
         for pdo in (*self.rpdos, *self.tpdos):
             pdo.rebuild()
         self.state, self._boots_at, self._host_heard = Nmt.BOOT, now + self.boot_delay, None
@@ -144,7 +146,7 @@ class Node:
         if len(data) != 2 or data[1] not in (0, self.id):
             return
         if data[0] in (129, 130):
-            self.reset(now)
+            self.reset(now, communication=data[0] == 130)
         elif self.state is not Nmt.BOOT and data[0] in COMMANDS:
             self.enter(COMMANDS[data[0]])
 
