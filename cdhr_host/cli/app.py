@@ -15,9 +15,11 @@ from cdhr_host.cli import (
     plot,
     profiles,
     reproduce,
+    resume,
     serve,
     sim,
     stream,
+    study,
     workspace,
 )
 from cdhr_host.cli.options import examples
@@ -42,6 +44,7 @@ app = typer.Typer(
 )
 app.command("stream", epilog=stream.EXAMPLES)(stream.stream)
 app.command("dry-run", epilog=dry_run.EXAMPLES)(dry_run.dry_run)
+app.command("resume", epilog=resume.EXAMPLES)(resume.resume)
 app.command("jog", epilog=jog.EXAMPLES)(jog.jog)
 app.command("sim", epilog=sim.EXAMPLES)(sim.sim)
 app.command("serve", epilog=serve.EXAMPLES)(serve.serve)
@@ -53,6 +56,7 @@ app.command("plot", epilog=plot.EXAMPLES)(plot.plot)
 app.command("workspace", epilog=workspace.EXAMPLES)(workspace.workspace)
 app.add_typer(generate.app, name="generate")
 app.add_typer(calibrate.app, name="calibrate")
+app.add_typer(study.app, name="study")
 
 
 def _version(asked: bool) -> None:

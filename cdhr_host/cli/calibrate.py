@@ -2,7 +2,7 @@
 
 import typer
 
-from cdhr_host.cli import calibrate_clay
+from cdhr_host.cli import calibrate_clay, calibrate_geometry, study
 from cdhr_host.cli.options import examples
 
 app = typer.Typer(
@@ -10,7 +10,12 @@ app = typer.Typer(
     epilog=examples(
         "cdhr calibrate clay --pattern cups.gcode",
         "cdhr calibrate clay cups.csv --plot fit.png --write my-stoneware",
+        "cdhr calibrate plan poses.csv --gcode poses.gcode",
+        "cdhr calibrate geometry poses.csv --plot residuals.png --write mine.toml",
     ),
     no_args_is_help=True,
 )
 app.command("clay", epilog=calibrate_clay.EXAMPLES)(calibrate_clay.clay)
+app.command("plan", epilog=calibrate_geometry.PLAN)(calibrate_geometry.plan)
+app.command("geometry", epilog=calibrate_geometry.GEOMETRY)(calibrate_geometry.geometry)
+app.command("study", epilog=study.CALIBRATION)(study.calibration)
