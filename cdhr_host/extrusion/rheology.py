@@ -150,9 +150,9 @@ class ChannelFlow:
         """Positive flows -> (pressure above the threshold, its derivative by the flow)."""
         excess, slope = np.zeros_like(flow), np.zeros_like(flow)
         for bore in self.channels:
-            stress = _excess_stress(self.material, bore, flow)
+            stress, log_slope = _excess_stress(self.material, bore, flow)
             excess += bore.pressure_per_stress * stress
-            slope += bore.pressure_per_stress * stress / (flow * _log_slope(self.material, stress))
+            slope += bore.pressure_per_stress * stress / (flow * log_slope)
         return excess, slope
 
     def _flow_of_excess(self, excess: Array) -> Array:
@@ -162,7 +162,7 @@ class ChannelFlow:
         bounds is the start. ln excess is convex in ln Q, so the iteration falls to the solution.
         """
         bounds = [
-            _bore_flow(self.material, bore, excess / bore.pressure_per_stress) for bore in self.channels
+            _bore_flow(self.material, bore, excess / bore.pressure_per_stress)[0] for bore in self.channels
         ]
         if len(bounds) == 1:
             return bounds[0]
@@ -186,32 +186,24 @@ class ChannelFlow:
         )
 
 
-def _bore_flow(material: Material, bore: Channel, stress: Array) -> Array:
-    """Wall stress above the yield stress, positive -> flow: the closed form of this module's head."""
-    power, at_wall = 1.0 / material.index, stress + material.yield_stress
+def _bore_flow(material: Material, bore: Channel, stress: Array) -> tuple[Array, Array]:
+    """Wall stress a above the yield stress, positive -> flow, d ln Q / d ln a: this module's head.
+
+    The slope lies between 1 / index and 1 / index + 1.
+    """
+    power = 1.0 / material.index
+    far, between, near = 1.0 / (power + 3.0), 2.0 / (power + 2.0), 1.0 / (power + 1.0)
+    sheared = stress / (stress + material.yield_stress)
+    plug = 1.0 - sheared
+    form = sheared * (far * sheared + between * plug) + near * plug * plug
     rate = (stress / material.consistency) ** power
-    return np.pi * (bore.diameter / 2.0) ** 3 * rate * (stress / at_wall) * _form(material, stress)
+    flow = (np.pi * (bore.diameter / 2.0) ** 3) * rate * sheared * form
+    slope = power + 1.0 - 3.0 * sheared + sheared * (2.0 * far * sheared + between * plug) / form
+    return flow, slope
 
 
-def _form(material: Material, stress: Array) -> Array:
-    """(a² / (m + 3) + 2 a y / (m + 2) + y² / (m + 1)) / w², between 1 / (m + 3) and 1 / (m + 1)."""
-    power = 1.0 / material.index
-    sheared = stress / (stress + material.yield_stress)
-    plug = 1.0 - sheared
-    return sheared**2 / (power + 3.0) + 2.0 * sheared * plug / (power + 2.0) + plug**2 / (power + 1.0)
-
-
-def _log_slope(material: Material, stress: Array) -> Array:
-    """d ln Q / d ln a of one bore, between 1 / index and 1 / index + 1."""
-    power = 1.0 / material.index
-    sheared = stress / (stress + material.yield_stress)
-    plug = 1.0 - sheared
-    change = 2.0 * sheared * (sheared / (power + 3.0) + plug / (power + 2.0))
-    return power + 1.0 - 3.0 * sheared + change / _form(material, stress)
-
-
-def _excess_stress(material: Material, bore: Channel, flow: Array) -> Array:
-    """Positive flow -> wall stress above the yield stress, the inverse of ``_bore_flow``."""
+def _excess_stress(material: Material, bore: Channel, flow: Array) -> tuple[Array, Array]:
+    """Positive flow -> wall stress above the yield stress, the slope there: ``_bore_flow`` inverted."""
     power, log_consistency = 1.0 / material.index, np.log(material.consistency)
     log_rate = np.log(flow / (np.pi * (bore.diameter / 2.0) ** 3))
     start = log_consistency + (log_rate + np.log(power + 3.0)) / power
@@ -220,10 +212,11 @@ def _excess_stress(material: Material, bore: Channel, flow: Array) -> Array:
         start = np.maximum(start, plugged / (power + 1.0))
 
     def step(log_stress: Array) -> Array:
-        stress = np.exp(log_stress)
-        return np.log(flow / _bore_flow(material, bore, stress)) / _log_slope(material, stress)
+        found, slope = _bore_flow(material, bore, np.exp(log_stress))
+        return np.asarray(np.log(flow / found) / slope)
 
-    return np.exp(_newton(step, start))
+    stress = np.exp(_newton(step, start))
+    return stress, _bore_flow(material, bore, stress)[1]
 
 
 def _newton(step: Callable[[Array], Array], start: Array) -> Array:

@@ -132,3 +132,15 @@ def test_shapes_are_kept():
     flow = np.array([[0.0, 1.0], [20.0, 300.0]]) * MM3
     assert law.flow(law.pressure(flow)) == pytest.approx(flow, rel=1e-9)
     assert law.pressure(flow[1, 1]).shape == ()
+
+
+@pytest.mark.parametrize("index", [0.05, 0.2, 0.5, 1.0, 1.9])
+def test_what_the_iteration_rests_on(index):
+    """d ln(p - threshold) / d ln Q rises from n / (1 + n) to n: Newton's method never passes the root."""
+    law = ChannelFlow(Material(1.0, 1.0, index), (NOZZLE,))
+    pressure = law.threshold * (1 + np.geomspace(1e-5, 1e5, 400))
+    flow = law.flow(pressure)
+    slope = law.resistance(flow) * flow / (pressure - law.threshold)
+    assert slope[0] == pytest.approx(index / (1 + index), rel=1e-4)
+    assert slope[-1] == pytest.approx(index, rel=1e-3)
+    assert (np.diff(slope) > -1e-9).all()
