@@ -165,25 +165,32 @@ class View {
     requestAnimationFrame(fly);
   }
 
-  // the vertex nearest to a place on the screen, within 14 pixels
+  // where the path passes a place on the screen, within 14 pixels: the vertex it comes from, and how far on; or null
   pick(x, y) {
     const { clientWidth: width, clientHeight: height } = byId("scene"), [first, last] = this.range();
-    let [best, found, depth] = [14 ** 2, -1, Infinity];
+    let [nearest, found, depth] = [14 ** 2, null, Infinity], before = null;
     for (let i = first; i <= last; i++) {
-      if (!this.travel && !this.trail.flow[i]) continue;
-      const [u, v, w] = projected(this.matrix, this.trail.place(i), width, height), square = (u - x) ** 2 + (v - y) ** 2;
-      if (w > 0 && square < best && (square < best - 16 || w < depth)) [best, found, depth] = [square, i, w];
+      const here = projected(this.matrix, this.trail.place(i), width, height), w = here[2];
+      if (before && w > 0 && before[2] > 0 && (this.travel || this.trail.flow[i])) {
+        const [dx, dy] = [here[0] - before[0], here[1] - before[1]], square = dx * dx + dy * dy;
+        const along = square ? Math.min(Math.max(((x - before[0]) * dx + (y - before[1]) * dy) / square, 0), 1) : 0;
+        const away = (before[0] + along * dx - x) ** 2 + (before[1] + along * dy - y) ** 2;
+        if (away < nearest && (away < nearest - 16 || w < depth)) [nearest, found, depth] = [away, { i: i - 1, along }, w];
+      }
+      before = here;
     }
     return found;
   }
 
-  read(i) {
-    const { trail } = this, readout = byId("readout");
-    readout.hidden = i < 0;
-    if (i < 0) return;
-    const [x, y, z] = trail.place(i).map((each) => each.toFixed(2));
-    readout.textContent = `line ${trail.line[i]}  at ${clockText(trail.t[i] / 1000)}\nx ${x}  y ${y}  z ${z} mm\n`
-      + `${trail.value("speed", i).toFixed(1)} mm/s  margin ${trail.value("margin", i).toFixed(2)}  ${trail.value("pressure", i).toFixed(1)} kPa`;
+  // numbers part of the way from a vertex to the next
+  read(i, along = 0) {
+    const { trail } = this, next = Math.min(i + 1, trail.t.length - 1);
+    const between = (number) => (1 - along) * number(i) + along * number(next);
+    const [x, y, z] = [0, 1, 2].map((axis) => between((k) => trail.place(k)[axis]).toFixed(2));
+    const shown = (name, digits) => between((k) => trail.value(name, k)).toFixed(digits);
+    byId("readout").textContent = `line ${trail.line[along > 0 ? next : i]}  at ${clockText(between((k) => trail.t[k]) / 1000)}\n`
+      + `x ${x}  y ${y}  z ${z} mm\n${shown("speed", 1)} mm/s  margin ${shown("margin", 2)}  ${shown("pressure", 1)} kPa`;
+    byId("readout").hidden = false;
   }
 }
 
@@ -214,7 +221,9 @@ function listen(view) {
   const lift = (event) => {
     if (fingers.delete(event.pointerId) && event.type === "pointerup" && moved < 5 && !fingers.size) {
       const edge = canvas.getBoundingClientRect();
-      view.read(view.pick(event.clientX - edge.left, event.clientY - edge.top));
+      const found = view.pick(event.clientX - edge.left, event.clientY - edge.top);
+      if (found) view.read(found.i, found.along);
+      else byId("readout").hidden = true;
     }
   };
   canvas.addEventListener("pointerup", lift);

@@ -32,9 +32,8 @@ AT_REST = """() => {
   const frames = () => document.documentElement.dataset.frames, was = frames();
   return new Promise((done) => setTimeout(() => done(was !== undefined && frames() === was), 400));
 }"""
-ON_SCREEN = """(line) => {
-  const { trail, matrix } = window.cdhr, { clientWidth, clientHeight } = document.getElementById("scene");
-  const place = trail.place((trail.firstAt(trail.line, line) + trail.firstAt(trail.line, line + 1)) >> 1);
+ON_SCREEN = """(place) => {
+  const { matrix } = window.cdhr, { clientWidth, clientHeight } = document.getElementById("scene");
   const row = (k) => [...place, 1].reduce((sum, each, axis) => sum + matrix[4 * axis + k] * each, 0);
   return [(row(0) / row(3) + 1) * clientWidth / 2, (1 - row(1) / row(3)) * clientHeight / 2];
 }"""
@@ -162,9 +161,14 @@ def test_a_click_on_the_path_reads_its_numbers(opened):
     page = opened()
     page.locator("button[data-view=top]").click()
     seen(page)
-    x, y = page.evaluate(ON_SCREEN, 12)
+    x, y = page.evaluate(ON_SCREEN, [200.0, 0.0, 2.0])
     page.locator("#scene").click(position={"x": x, "y": y})
-    assert page.locator("#readout").inner_text().startswith("line 12 ")
+    words = page.locator("#readout").inner_text()
+    assert words.startswith("line 5 ")
+    assert float(words.split("x ")[1].split()[0]) == pytest.approx(200, abs=2)
+    assert "20.0 mm/s" in words
+    page.locator("#scene").click(position={"x": 20, "y": 400})
+    assert not page.locator("#readout").is_visible()
 
 
 def test_a_phone_in_the_dark_shows_it_too(opened):
