@@ -29,6 +29,8 @@ BUMP = np.array([0.0, 0.0, 0.0, 1.0, -3.0, 3.0, -1.0])
 BUMP_AREA = 1.0 / 140.0
 WHOLE = 1e-9
 """ticks from a whole one that are rounding"""
+NEARLY_WHOLE = 1e-6
+"""the same after a ramp that lands"""
 
 
 class Beat(NamedTuple):
@@ -183,11 +185,9 @@ class Pace:
         """As it is up to a ramp's beginning, then the ramp, then what it leads to."""
         target = _target(ramped)
         after = _after(ramped, target)
-        if (
-            target == 1.0
-            and abs(offset := after.u - after.begin - round(after.u - after.begin)) < WHOLE * 1e3
-        ):
-            after = steady(after.begin, after.u - offset, 1.0)
+        whole = round(after.u - after.begin)
+        if target == 1.0 and abs(after.u - after.begin - whole) < NEARLY_WHOLE:
+            after = steady(after.begin, after.begin + whole, 1.0)
         return Pace((*self._before(ramped.begin), ramped, after))
 
     def since(self, tick: float) -> "Pace":
