@@ -3,6 +3,7 @@
 import asyncio
 import difflib
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
@@ -152,9 +153,16 @@ class Executor:
 
     async def _pause(self, _: str) -> None:
         self._host.surface.hold("paused by a client")
+        await self._stands()
 
     async def _resume(self, _: str) -> None:
+        await self._stands()
         self._host.surface.resume()
+
+    async def _stands(self) -> None:
+        """A hold that is under way comes to its rest."""
+        with suppress(TimeoutError):
+            await asyncio.wait_for(self._host.until(lambda state: state is not JobState.HOLDING), PATIENCE)
 
     async def _cancel(self, _: str) -> None:
         if self._host.state in ACTIVE:

@@ -50,6 +50,8 @@ class Doors:
     address: str = "127.0.0.1"
     """of the HTTP port"""
     key: ApiKey | None = None
+    demands_key: bool = False
+    """ask for the key on loopback too"""
     names: frozenset[str] = field(default_factory=frozenset)
     origins: frozenset[str] = field(default_factory=frozenset)
 
@@ -64,6 +66,7 @@ class Server:
         self.streams = Streams(self.host)
         self.addresses: dict[str, str] = {}
         """where each door is"""
+        self.http: HttpDoor | None = None
         self.interrupted = False
         """whether a print was under way when the server ended"""
         self._doors = doors
@@ -106,12 +109,12 @@ class Server:
         doors = self._doors
         guard = Guard(
             doors.key,
-            not is_loopback(doors.address),
+            doors.demands_key or not is_loopback(doors.address),
             doors.names,
             doors.origins,
             now=self.host.monotonic,
         )
-        http = HttpDoor(self.host, self.executor, guard, doors.address, port)
+        self.http = http = HttpDoor(self.host, self.executor, guard, doors.address, port)
         await http.open()
         stack.push_async_callback(http.close)
         shown = f"[{doors.address}]" if ":" in doors.address else doors.address

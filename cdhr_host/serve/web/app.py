@@ -1,11 +1,11 @@
 """The HTTP port: routes, errors as JSON, and the port's life."""
 
 import asyncio
-import json
 from importlib.resources import files
 from typing import Any, Final
 
 from aiohttp import web
+from aiohttp.http import HttpProcessingError
 from aiohttp.typedefs import Handler, Middleware
 
 from cdhr_host.errors import JobError
@@ -58,7 +58,7 @@ class HttpDoor:
         self._sockets: Sockets | None = None
         self._runner: web.AppRunner | None = None
         self._server: asyncio.Server | None = None
-        self._gates: Gates | None = None
+        self.gates: Gates
 
     async def open(self) -> None:
         """Listen; OSError when the port is taken."""
@@ -66,9 +66,9 @@ class HttpDoor:
         self._runner = web.AppRunner(self._app(), access_log=None, handle_signals=False, shutdown_timeout=2.0)
         await self._runner.setup()
         assert self._runner.server is not None
-        self._gates = Gates(self._runner.server)
+        self.gates = Gates(self._runner.server)
         loop = asyncio.get_running_loop()
-        self._server = await loop.create_server(self._gates, self.address, self.port)
+        self._server = await loop.create_server(self.gates, self.address, self.port)
         self.port = self._server.sockets[0].getsockname()[1]
 
     async def close(self) -> None:
@@ -110,8 +110,8 @@ class HttpDoor:
     def _spoken(self) -> Middleware:
         @web.middleware
         async def middleware(request: web.Request, handler: Handler) -> web.StreamResponse:
-            if self._gates is not None and request.transport is not None:
-                self._gates.spoke.add(request.transport)
+            if request.transport is not None:
+                self.gates.spoke.add(request.transport)
             return await handler(request)
 
         return middleware
@@ -232,7 +232,7 @@ async def _told(request: web.Request, handler: Handler) -> web.StreamResponse:
         return refuse(request, error.code if error.code > 0 else 400, str(error))
     except TimeoutError:
         return refuse(request, 408, "the client was too slow")
-    except (json.JSONDecodeError, UnicodeDecodeError, ValueError, AttributeError, RecursionError) as error:
+    except (HttpProcessingError, ValueError, TypeError, AttributeError, RecursionError) as error:
         LOG.debug("a request that was not understood", exc_info=error)
         return refuse(request, 400, "the request was not understood")
 
