@@ -6,6 +6,7 @@ import typer
 
 from cdhr_host import __version__
 from cdhr_host.cli import (
+    bead,
     calibrate,
     compensation,
     drives,
@@ -53,6 +54,7 @@ app.add_typer(drives.app, name="drives")
 app.command("compensation", epilog=compensation.EXAMPLES)(compensation.compensation)
 app.command("reproduce", epilog=reproduce.EXAMPLES)(reproduce.reproduce)
 app.command("plot", epilog=plot.EXAMPLES)(plot.plot)
+app.command("bead", epilog=bead.EXAMPLES)(bead.bead)
 app.command("workspace", epilog=workspace.EXAMPLES)(workspace.workspace)
 app.add_typer(generate.app, name="generate")
 app.add_typer(calibrate.app, name="calibrate")

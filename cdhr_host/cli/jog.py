@@ -12,6 +12,7 @@ from cdhr_host.cli.refusals import INTERRUPTED, emit
 
 if TYPE_CHECKING:
     from cdhr_host.job.printer import Printer
+    from cdhr_host.job.recorder import Names, Recorder
 
 EXAMPLES = examples(
     "cdhr jog",
@@ -39,7 +40,7 @@ def jog(
     machine = open_machine(profile, material)
     link, clock = opened(drives, machine, speed)
     try:
-        printer = Printer(link, clock)
+        printer = Printer(link, clock, recorder=Recorder(link, Names(profile, material, drives)))
         printer.begin()
         try:
             code = _screen(printer) if sys.stdin.isatty() else _lines(printer)

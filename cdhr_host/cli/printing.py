@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from cdhr_host.job.closed_loop import Loop
     from cdhr_host.job.printer import Printer
     from cdhr_host.job.program import Program
+    from cdhr_host.job.recorder import Recorder
+    from cdhr_host.job.recovery import Recovery
     from cdhr_host.job.surface import Event
     from cdhr_host.pipeline import Checked
     from cdhr_host.profile import Profile
@@ -43,8 +45,13 @@ class Run:
     stop: StopRequest
     waits: bool
     """whether pauses wait for the operator"""
+    recorder: "Recorder"
     loop: "Loop | None" = None
     """the simulated machine's control loop, where there is one"""
+    recovery: "Recovery | None" = None
+    """where it goes on; None for a fresh print"""
+    goes_on: str = ""
+    """the journal of the print it goes on with"""
 
 
 class Stretches:
@@ -94,13 +101,13 @@ def _by_printer(run: Run, done: "Callable[[Setpoints, Feedback], None]", keys: K
     from cdhr_host.job.printer import Printer
     from cdhr_host.job.surface import JobState
 
-    printer, tally = Printer(run.link, run.clock), Tally()
+    printer, tally = Printer(run.link, run.clock, recorder=run.recorder), Tally()
     printer.observe(tally.add)
     printer.observe(done)
     printer.listen(_told)
     try:
         printer.adopt(run.program)
-        printer.start()
+        _begun(printer, run)
         while printer.state is not JobState.DONE and not _ended(printer, run, keys):
             printer.turn()
             printer.wait()
@@ -110,6 +117,16 @@ def _by_printer(run: Run, done: "Callable[[Setpoints, Feedback], None]", keys: K
         raise printer.fault
     interrupted = printer.state is not JobState.DONE
     return tally.summary(run.machine.drives.period, interrupted=interrupted, timing=run.link.timing())
+
+
+def _begun(printer: "Printer", run: Run) -> None:
+    """At the beginning, or where an interrupted print goes on."""
+    if run.recovery is None:
+        printer.start()
+        return
+    printer.recover(run.recovery, goes_on=run.goes_on)
+    printer.turn()
+    printer.resume()
 
 
 def _ended(printer: "Printer", run: Run, keys: Keys) -> bool:

@@ -88,23 +88,34 @@ def serve(
         names=frozenset(name or ()),
         origins=frozenset(each.rstrip("/") for each in origin or ()),
     )
-    interrupted = _serve(open_machine(profile, material), drives, speed, doors, json_=json_)
+    interrupted = _serve(
+        open_machine(profile, material), (profile, material), drives, speed, doors, json_=json_
+    )
     if interrupted:
         raise typer.Exit(INTERRUPTED)
 
 
-def _serve(machine: "Profile", drives: str, speed: float, doors: "Doors", *, json_: bool) -> bool:
-    """Run to the end; whether a print was interrupted."""
+def _serve(
+    machine: "Profile",
+    names: tuple[str, str | None],
+    drives: str,
+    speed: float,
+    doors: "Doors",
+    *,
+    json_: bool,
+) -> bool:
+    """Run to the end; whether a print was interrupted. ``names`` are those of profile and material."""
     import asyncio
     import logging
 
     from cdhr_host.job.printer import Printer
+    from cdhr_host.job.recorder import Names, Recorder
     from cdhr_host.serve.server import Server
 
     logging.basicConfig(level=logging.WARNING, format="cdhr: %(message)s")
     link, clock = opened(drives, machine, speed)
     try:
-        printer = Printer(link, clock)
+        printer = Printer(link, clock, recorder=Recorder(link, Names(*names, drives)))
         printer.begin()
         try:
             server = Server(printer, doors)

@@ -12,12 +12,12 @@ from cdhr_host.cli.machine import SIMULATED, check_log, open_machine, opened
 from cdhr_host.cli.options import DrivesUrl, Json, LogPath, MaterialName, ProfileName, Program, examples
 from cdhr_host.cli.printing import Run, printed
 from cdhr_host.cli.proving import checking, tell_problems
-from cdhr_host.cli.refusals import INTERRUPTED, Refusal, about, emit
+from cdhr_host.cli.refusals import INTERRUPTED, Refusal, about, emit, say
 from cdhr_host.cli.source import Source
 
 if TYPE_CHECKING:
     from cdhr_host.job.closed_loop import Loop
-    from cdhr_host.job.program import Program
+    from cdhr_host.job.program import Program as Proven
     from cdhr_host.pipeline import Proof
     from cdhr_host.profile import Profile
 
@@ -61,6 +61,7 @@ def stream(
 ) -> None:
     """Prove the whole file, then print it; exit 0 only when all of it was done, at rest, the air off."""
     from cdhr_host.errors import MotionError
+    from cdhr_host.job.recorder import Names, Recorder
     from cdhr_host.report.run import run_lines, run_record
 
     if file == "-":
@@ -74,14 +75,15 @@ def stream(
     link, clock = opened(drives, machine, speed)
     try:
         with about(source.name):
-            program = _program(source, machine)
+            program = program_of(source, machine)
             proof = program.proof
             tell_problems(proof, source)
             if not proof.ok:
                 raise typer.Exit(MotionError.exit_code)
             _agreed(proof, drives, yes)
             with StopRequest() as stop:
-                run = Run(source, machine, program, link, clock, stop, waits=not yes, loop=loop)
+                recorder = Recorder(link, Names(profile, material, drives))
+                run = Run(source, machine, program, link, clock, stop, not yes, recorder, loop)
                 summary = printed(run, log)
     finally:
         link.close()
@@ -90,10 +92,11 @@ def stream(
     else:
         emit("\n".join(run_lines(summary, proof, source.name)))
     if summary.interrupted:
+        say("cdhr: cdhr resume goes on with this print")
         raise typer.Exit(INTERRUPTED)
 
 
-def _program(source: Source, machine: "Profile") -> "Program":
+def program_of(source: Source, machine: "Profile") -> "Proven":
     """The file, proven."""
     from pathlib import Path
 

@@ -48,7 +48,8 @@ class Aside:
         x, y, _ = self.nozzle_G.tolist()
         places = np.array([[at_G[0], at_G[1], top], [x, y, top], self.nozzle_G])
         moved = np.abs(np.diff(np.vstack((at_G, places)), axis=0)).max(axis=1) > THERE
-        return places[moved]
+        kept: Array = places[moved]
+        return kept
 
     def going_on(self, tick: int) -> Making:
         """Its making again, standing since before a later tick of the drives."""

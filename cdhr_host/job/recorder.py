@@ -13,7 +13,7 @@ from typing import Final
 from cdhr_host.drives.link import MachineLink
 from cdhr_host.errors import Problem
 from cdhr_host.job.black_box import SUFFIX, BlackBox
-from cdhr_host.job.journal import Executed, Fed, JournalWriter, Opened, Turned, journal_folder
+from cdhr_host.job.journal import Executed, Fed, JournalWriter, Opened, Turned, journal_folder, prune
 from cdhr_host.job.journal.records import VERSION
 from cdhr_host.job.journal.writing import SUFFIX as JOURNAL
 from cdhr_host.job.program import ProgramFile
@@ -35,12 +35,21 @@ class Plan:
     fed: float
 
 
+@dataclass(frozen=True, slots=True)
+class Names:
+    """What the machine was called with, so that a print can go on with the same."""
+
+    profile: str
+    material: str | None = None
+    drives: str = "loopback:"
+
+
 class Recorder:
     """One printer's; everything from the printer's thread."""
 
-    def __init__(self, link: MachineLink, profile_name: str, folder: Path | None = None) -> None:
+    def __init__(self, link: MachineLink, names: Names, folder: Path | None = None) -> None:
         self._link = link
-        self._name = profile_name
+        self._names = names
         self._folder = folder or journal_folder()
         self._box = BlackBox(link.profile)
         self._dogs = Watchdogs(link.profile)
@@ -57,14 +66,17 @@ class Recorder:
     def begin(self, file: ProgramFile, *, goes_on: str = "", extruded: float = 0.0) -> None:
         """A print begins, m³ after its beginning. Raises JobError where no journal can be written."""
         self.end()
+        prune(self._folder)
         now = datetime.now(UTC)
         stem = f"{now:%Y%m%d-%H%M%S-%f}-{file.path.stem}"
         opened = Opened(
             version=VERSION,
             file=str(file.path.resolve()),
             sha256=digest_of(file.path),
-            profile=self._name,
+            profile=self._names.profile,
+            material=self._names.material,
             profile_sha256=digest_of_profile(self._link.profile),
+            drives=self._names.drives,
             period_s=self._link.profile.drives.period,
             begun=now.isoformat(timespec="seconds"),
             goes_on=goes_on,

@@ -72,19 +72,17 @@ class Resuming:
     def found(self, journal: Journal, measured_G: Array, stops: Stops, overlap: float) -> Recovery:
         """From a journal and (3,) m where the nozzle stands; ``overlap`` m is what the operator wants.
 
-        Raises JobError where the journal is not of this plan, or the nozzle not near it.
+        Raises JobError where the journal is not of this plan, or the nozzle not near its path.
         """
-        last = journal.executed
-        if last is None:
-            raise _refusal("nothing of this print was executed", "cdhr stream FILE begins it anew")
-        course = self._course(max(last.plan_tick - BACK / self._period, 0.0))
-        self._check_plan(course, last)
-        bead, rested, away, sure = self._rest(course, journal, last, measured_G, stops)
-        tick = self._before(course, bead, overlap)
-        doubled = self._length(course, tick, rested if sure else max(rested, bead))
-        return Recovery(
-            tick, self._line(course, tick), self._place(course, tick), bead, rested, doubled, away, sure
-        )
+        last, fed, course = self._known(journal)
+        bead, rested, away, sure = self._rest(course, journal.state, (last, fed), measured_G, stops)
+        return self._going_on(course, (bead, rested), overlap, away=away, sure=sure)
+
+    def moved(self, journal: Journal, overlap: float) -> Recovery:
+        """From a journal alone, where the machine was moved since: the bead ended there, or later."""
+        last, fed, course = self._known(journal)
+        rested = last.plan_tick if journal.state == "held" else fed
+        return self._going_on(course, (last.plan_tick, rested), overlap, sure=rested == last.plan_tick)
 
     def at_line(self, line: int) -> Recovery:
         """From the first tick of a line on. Raises JobError for a line that moves nothing."""
@@ -117,9 +115,31 @@ class Resuming:
         course.plan(math.ceil(tick) + 1)
         return course
 
+    def _known(self, journal: Journal) -> tuple[Executed, float, Course]:
+        """What was executed last, the tick that the drives may have got to, and the plan around them."""
+        last = journal.executed
+        if last is None:
+            raise _refusal("nothing of this print was executed", "cdhr stream FILE begins it anew")
+        fed = max(journal.fed.plan_tick if journal.fed else last.plan_tick, last.plan_tick)
+        course = self._course(max(last.plan_tick - BACK / self._period, 0.0))
+        course.plan(math.ceil(fed) + 1)
+        self._check_plan(course, last)
+        return last, fed, course
+
+    def _going_on(
+        self, course: Course, ended: tuple[float, float], overlap: float, *, away: float = 0.0, sure: bool
+    ) -> Recovery:
+        """Before the bead's end, by the overlap; ``ended`` are the ticks of the bead's end and of rest."""
+        bead, rested = ended
+        stop = course.stop()
+        rested = rested if stop is None else min(rested, stop.tick - 1.0)
+        tick = self._before(course, bead, overlap)
+        line, place = self._line(course, tick), self._place(course, tick)
+        twice = self._length(course, tick, bead if sure else rested)
+        return Recovery(tick, line, place, bead, rested, twice, away, sure)
+
     def _check_plan(self, course: Course, last: Executed) -> None:
         """Raises JobError where the plan is not the one the journal was written by."""
-        course.plan(math.ceil(last.plan_tick) + 1)
         away = float(np.linalg.norm(self._place(course, last.plan_tick) - np.array(last.nozzle_mm) * MM))
         if away > SAME:
             raise _refusal(
@@ -129,10 +149,10 @@ class Resuming:
             )
 
     def _rest(
-        self, course: Course, journal: Journal, last: Executed, measured_G: Array, stops: Stops
+        self, course: Course, state: str, known: tuple[Executed, float], measured_G: Array, stops: Stops
     ) -> tuple[float, float, float, bool]:
         """Ticks at which the bead ended and the nozzle rests, m from the path, and whether that is sure."""
-        fed = max(journal.fed.plan_tick if journal.fed else last.plan_tick, last.plan_tick)
+        last, fed = known
         rows = self._rows(course, last.plan_tick, fed)
         away = np.linalg.norm(rows.nozzle_G - measured_G, axis=1)
         nearest = int(away.argmin())
@@ -143,7 +163,7 @@ class Resuming:
                 f"the nozzle stands {distance / MM:.2f} mm from the path it was on (limit {NEAR / MM:g} mm)",
                 "if it was moved since, say --moved; if not, reference the machine",
             )
-        if journal.state == "held":
+        if state == "held":
             return last.plan_tick, last.plan_tick, distance, True
         begin = _stop_begin(rows, nearest, stops)
         if begin is None:

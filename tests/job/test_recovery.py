@@ -11,7 +11,7 @@ from cdhr_host.errors import JobError
 from cdhr_host.job.journal import Journal, read_journal
 from cdhr_host.job.printer import Printer
 from cdhr_host.job.program import Program, ProgramFile, proven
-from cdhr_host.job.recorder import Recorder
+from cdhr_host.job.recorder import Names, Recorder
 from cdhr_host.job.recovery import Recovery, Resuming
 from cdhr_host.job.surface import JobState
 from cdhr_host.pipeline import Staircase, open_profile
@@ -51,7 +51,7 @@ class Machine:
     def printer(self) -> Printer:
         """A host process that has just begun."""
         self.link.open()
-        printer = Printer(self.link, self.clock, recorder=Recorder(self.link, "paper", self.folder))
+        printer = Printer(self.link, self.clock, recorder=Recorder(self.link, Names("paper"), self.folder))
         printer.observe(self._executed)
         return printer
 

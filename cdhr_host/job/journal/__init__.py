@@ -2,7 +2,7 @@
 
 from cdhr_host.job.journal.reading import Damage, Journal, read_journal
 from cdhr_host.job.journal.records import Executed, Fed, Opened, Record, Turned
-from cdhr_host.job.journal.writing import JournalWriter, journal_folder, latest_unfinished
+from cdhr_host.job.journal.writing import JournalWriter, journal_folder, latest_unfinished, prune
 
 __all__ = [
     "Damage",
@@ -15,5 +15,6 @@ __all__ = [
     "Turned",
     "journal_folder",
     "latest_unfinished",
+    "prune",
     "read_journal",
 ]

@@ -25,8 +25,11 @@ class Opened:
     """of the program's bytes as stored"""
     profile: str
     """name or path, as given"""
+    material: str | None
     profile_sha256: str
     """of all values of the profile"""
+    drives: str
+    """URL"""
     period_s: float
     """of the drives' ticks"""
     begun: str

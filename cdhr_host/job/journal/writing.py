@@ -19,6 +19,8 @@ from cdhr_host.job.journal.records import Opened, Record, Turned, encoded
 SYNC_EVERY: Final = 1.0
 """s"""
 SUFFIX: Final = ".journal"
+KEPT: Final = 100
+"""journals"""
 
 
 def journal_folder() -> Path:
@@ -28,20 +30,25 @@ def journal_folder() -> Path:
 
 
 def latest_unfinished(folder: Path) -> Path:
-    """The youngest journal of a print that did not end; raises JobError when there is none."""
+    """The youngest journal of a print that did not end and that none goes on from; JobError without one."""
+    gone_on: set[str] = set()
     for path in sorted(folder.glob(f"*{SUFFIX}"), reverse=True):
         try:
-            if not read_journal(path).finished:
-                return path
+            journal = read_journal(path)
         except JobError:
             continue
-    raise JobError(
-        Problem(
-            "journal",
-            f"no interrupted print in {folder}",
-            hint="give the journal's path: cdhr resume JOURNAL",
-        )
-    )
+        gone_on.add(journal.opened.goes_on)
+        if not journal.finished and str(path) not in gone_on:
+            return path
+    hint = "give the journal's path: cdhr resume JOURNAL"
+    raise JobError(Problem("journal", f"no interrupted print in {folder}", hint=hint))
+
+
+def prune(folder: Path, keep: int = KEPT) -> None:
+    """Remove all but the youngest journals, and the black boxes beside them."""
+    for path in sorted(folder.glob(f"*{SUFFIX}"), reverse=True)[keep:]:
+        path.unlink(missing_ok=True)
+        path.with_suffix(".npz").unlink(missing_ok=True)
 
 
 class JournalWriter:

@@ -3,6 +3,7 @@
 import os
 import random
 import resource
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -17,11 +18,14 @@ from cdhr_host.job.journal import (
     Opened,
     Turned,
     latest_unfinished,
+    prune,
     read_journal,
 )
 from cdhr_host.job.journal.records import decoded, encoded
 
-OPENED = Opened(1, "/tmp/väse.gcode", "ab" * 32, "paper", "cd" * 32, 0.004, "2026-11-22T06:00:00", "")
+OPENED = Opened(
+    1, "/tmp/väse.gcode", "ab" * 32, "paper", None, "cd" * 32, "loopback:", 0.004, "2026-11-22T06:00:00", ""
+)
 
 
 def executed(i: int, *, air: bool = True) -> Executed:
@@ -132,6 +136,23 @@ def test_the_youngest_that_did_not_end_is_found(tmp_path: Path) -> None:
     assert latest_unfinished(tmp_path) == tmp_path / "2026-01-02.journal"
     with pytest.raises(JobError, match="no interrupted print"):
         latest_unfinished(tmp_path / "none")
+
+
+def test_one_that_was_gone_on_from_is_not_found_again(tmp_path: Path) -> None:
+    first = tmp_path / "2026-01-01.journal"
+    written(first)
+    with JournalWriter(tmp_path / "2026-01-02.journal", replace(OPENED, goes_on=str(first))) as journal:
+        journal.add(Turned("done", ""))
+    with pytest.raises(JobError, match="no interrupted print"):
+        latest_unfinished(tmp_path)
+
+
+def test_old_ones_are_removed(tmp_path: Path) -> None:
+    for day in range(1, 8):
+        written(tmp_path / f"2026-01-0{day}.journal", 1)
+        (tmp_path / f"2026-01-0{day}.npz").touch()
+    prune(tmp_path, keep=3)
+    assert sorted(path.name[8:10] for path in tmp_path.iterdir()) == ["05", "05", "06", "06", "07", "07"]
 
 
 def test_one_is_never_written_over(tmp_path: Path) -> None:
