@@ -46,6 +46,7 @@ def proof_record(proof: Proof, file: str, profile: str) -> dict[str, Any]:
         "path_mm": proof.path / MM,
         "extruded_mm3": proof.extruded / MM3,
         "layers": len(proof.layers),
+        "layer_times": _layer_times(proof),
         "warnings": [problem_record(warning) for warning in proof.warnings],
         "extremes": {
             column: {"min": low, "min_line": low_line, "max": high, "max_line": high_line}
@@ -54,12 +55,22 @@ def proof_record(proof: Proof, file: str, profile: str) -> dict[str, Any]:
     }
 
 
+def _layer_times(proof: Proof) -> list[dict[str, Any]]:
+    """Of each layer that comments announce: its number, first line, beginning and duration."""
+    ends = [*proof.layer_times[1:], proof.duration]
+    return [
+        {"layer": layer, "line": line, "begin_s": begin, "duration_s": end - begin}
+        for (line, layer), begin, end in zip(proof.layers, proof.layer_times, ends, strict=False)
+    ]
+
+
 def refused_record(error: CdhrError, file: str, profile: str) -> dict[str, Any]:
     """The same object for a program that was not understood: what could not be known is null."""
     unknown = ("lines", "moves", "duration_s", "path_mm", "extruded_mm3", "layers")
     return {
         **_head(file, profile, False, error.problems, error.total),
         **dict.fromkeys(unknown),
+        "layer_times": [],
         "warnings": [],
         "extremes": {},
     }

@@ -7,6 +7,10 @@ import pytest
 from typer.testing import CliRunner
 
 from cdhr_host.cli.app import app
+from cdhr_host.errors import Problem
+from cdhr_host.job.black_box import BlackBox
+from cdhr_host.pipeline import open_profile, prove
+from cdhr_host.values import Feedback
 
 image = pytest.importorskip("matplotlib.image")
 
@@ -48,6 +52,24 @@ def test_a_run_shows_its_following_error_and_deposited_clay(folder):
     assert result.exit_code == 0
     assert (folder / "run-following.png").exists()
     assert near(image.imread(folder / "run-air.png"), (0xD5, 0x5E, 0x00)) > 200
+
+
+def test_events_of_a_black_box_are_named(tmp_path):
+    paper, blocks = open_profile("paper"), []
+    prove([b"G1 X60 F1200\nG1 X0\n"], paper, sink=blocks.append)
+    box = BlackBox(paper)
+    for rows in blocks:
+        none = np.zeros((len(rows), 6))
+        box.executed(
+            rows, Feedback(rows.tick, rows.slider, rows.slider, none.astype(int), none, rows.pressure)
+        )
+    box.event("fault", "slider 3 fell behind")
+    box.write(tmp_path / "box.npz", Problem("fault", "slider 3 fell behind"), "part.gcode", [])
+    out = tmp_path / "box.svg"
+    assert run("plot", tmp_path / "box.npz", "-w", "following", "-o", out).exit_code == 0
+    drawn = out.read_text(encoding="utf-8")
+    assert "part.gcode: slider 3 fell behind" in drawn
+    assert ">fault</text>" in drawn
 
 
 @pytest.mark.parametrize("suffix", ["svg", "pdf"])

@@ -28,6 +28,16 @@ def test_words_name_the_page(part, tmp_path):
     assert page.read_text().startswith("<!DOCTYPE html>")
 
 
+def test_json_tells_the_time_by_layer(tmp_path):
+    path = tmp_path / "layers.gcode"
+    path.write_text("M83\n;LAYER:0\nG1 Z2 F1200\nG1 X40 E90\n;LAYER:1\nG1 Z4\nG1 X0 E90\n")
+    record = json.loads(run(path, "--json").stdout)
+    layers = record["layer_times"]
+    assert [layer["line"] for layer in layers] == [2, 5]
+    assert sum(layer["duration_s"] for layer in layers) == pytest.approx(record["duration_s"])
+    assert layers[1]["begin_s"] == pytest.approx(layers[0]["duration_s"])
+
+
 def test_json_stays_one_object_and_names_the_page(part, tmp_path):
     page, log = tmp_path / "part.html", tmp_path / "part.csv"
     result = run(part, "--report", page, "--log", log, "--json")

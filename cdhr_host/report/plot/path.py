@@ -127,7 +127,7 @@ def _boxed(axes: Any, places: Array) -> None:
         getattr(axes, f"set_{name}lim")(middle[axis] - 0.5 * size[axis], middle[axis] + 0.5 * size[axis])
         getattr(axes, f"set_{name}label")(f"{name}, mm")
         getattr(axes, f"{name}axis").set_major_locator(MaxNLocator(max(2, int(7 * size[axis] / size.max()))))
-    axes.set_box_aspect(size, zoom=0.95 if size[2] > 0.5 * size.max() else 1.15)
+    axes.set_box_aspect(size, zoom=0.92)
     axes.view_init(elev=28, azim=-58)
 
 

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+ROOM: Final = 0.06
+"""of the time shown, that the name of an event takes"""
 SEEN: Final = 0.25
 """of a window's size that curves must reach for its ends to be drawn when they are far away"""
 
@@ -25,6 +27,21 @@ def draw_series(figure: "Figure", drawn: Drawn, rows: Rows) -> None:
             _panel(place, drawn, panel)
     for place in axes[-1]:
         clock_axis(place, *drawn.times)
+    for place in axes[0]:
+        _events(place, drawn)
+
+
+def _events(axes: "Axes", drawn: Drawn) -> None:
+    """Name what happened on the way, the last thing of each moment, where the names have room."""
+    begin, end = drawn.times
+    free, unit = end, clock(begin, end)[0]
+    for t, words in sorted({event.t: event.kind for event in drawn.events}.items(), reverse=True):
+        if begin <= t <= free:
+            place = (t / unit, 1.0)
+            axes.text(
+                *place, words, transform=axes.get_xaxis_transform(), ha="right", va="bottom", color="0.3"
+            )
+            free = t - ROOM * (end - begin)
 
 
 def _panel(axes: "Axes", drawn: Drawn, panel: Panel) -> None:
@@ -43,8 +60,8 @@ def _panel(axes: "Axes", drawn: Drawn, panel: Panel) -> None:
         title += f" (limit {_window_text(panel.window)} {panel.unit})"
     axes.set_title(title, loc="left")
     axes.set_ylabel(panel.unit)
-    for event in drawn.events:
-        axes.axvline(event.t / clock(*drawn.times)[0], color="0.4", linestyle=":", linewidth=0.8)
+    for t in sorted({event.t for event in drawn.events}):
+        axes.axvline(t / clock(*drawn.times)[0], color="0.4", linestyle=":", linewidth=0.8, clip_on=False)
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.04), handlelength=1.4)
 
 
