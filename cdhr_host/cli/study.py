@@ -26,7 +26,8 @@ WORKSPACE = examples(
     "cdhr study workspace --step 5 --plot margins.png --write margins.csv",
 )
 app = typer.Typer(help="Studies at scale: all cores, or a Dask cluster.", no_args_is_help=True)
-J, R = TypeVar("J"), TypeVar("R")
+J = TypeVar("J")
+R = TypeVar("R")
 Workers = Annotated[
     int | None, typer.Option(metavar="N", help="Processes; all cores when left out.", min=1, max=1024)
 ]

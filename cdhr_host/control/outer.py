@@ -152,7 +152,7 @@ class Outer:
 
     def _room(self, drift: Array, move: float) -> float:
         """What of a vertical ``move``, m/s, the rate limit leaves beside the shift's drift."""
-        x, y, z = drift.tolist()
+        x, y, z = (float(part) for part in drift)
         left = math.sqrt(max(self.settings.rate**2 - x * x - y * y, 0.0))
         return max(-left - z, min(left - z, move))
 

@@ -8,7 +8,6 @@ residuals say.
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Final
 
 import numpy as np
@@ -107,45 +106,64 @@ def calibrate(
     return found
 
 
-def _solved(cables: Cables, points: Points, doubts: Doubts, frame: Frame, noise: float) -> Calibrated:
-    each = doubts.each()
-    known = np.isfinite(points.place)
-    count = int(known.sum())
+class _Problem:
+    """Whitened residuals of the points, then the parameters, all in standard deviations."""
 
-    @lru_cache(maxsize=2)
-    def at(scaled: bytes) -> tuple[Array, Array]:
-        return whole(np.frombuffer(scaled))
+    def __init__(self, cables: Cables, points: Points, doubts: Doubts, frame: Frame, noise: float) -> None:
+        self.machine, self.points, self.noise = (cables, frame), points, noise
+        self.each = doubts.each()
+        self.known = np.isfinite(points.place)
+        self.count = int(self.known.sum())
+        self._at, self._rows = np.empty(0), (np.empty(0), np.empty(0))
 
-    def whole(scaled: Array) -> tuple[Array, Array]:
-        place, by = slopes(cables, frame, each * scaled, points.slider)
-        rows = np.concatenate([(place - points.place)[known] / noise, scaled])
-        return rows, np.vstack([by[known] * (each / noise), np.eye(len(each))])
+    def rows(self, scaled: Array) -> tuple[Array, Array]:
+        """(SIZE,) parameters in doubts -> residuals and their derivatives; the last answer is kept."""
+        if not np.array_equal(scaled, self._at):
+            place, by = slopes(*self.machine, self.each * scaled, self.points.slider)
+            short = (place - self.points.place)[self.known] / self.noise
+            steep = by[self.known] * (self.each / self.noise)
+            self._at = np.array(scaled)
+            self._rows = np.concatenate([short, scaled]), np.vstack([steep, np.eye(len(scaled))])
+        return self._rows
 
-    def huber(square: Array) -> Array:
-        """Of the points; what is known of the drawing stays square."""
+    def residuals(self, scaled: Array) -> Array:
+        """For the solver."""
+        return self.rows(scaled)[0]
+
+    def jacobian(self, scaled: Array) -> Array:
+        """For the solver."""
+        return self.rows(scaled)[1]
+
+    def huber(self, square: Array) -> Array:
+        """(3, K): value, slope and curvature for the squares; what is known of the drawing stays square."""
         size = np.sqrt(np.maximum(square, HUBER**2))
-        beyond = np.arange(len(square)) < count
-        beyond &= square > HUBER**2
+        beyond = (np.arange(len(square)) < self.count) & (square > HUBER**2)
         value = np.where(beyond, 2.0 * HUBER * size - HUBER**2, square)
         slope = np.where(beyond, HUBER / size, 1.0)
         return np.stack([value, slope, np.where(beyond, -0.5 * HUBER / size**3, 0.0)])
 
-    start = np.zeros(len(each))
+    def information(self, scaled: Array) -> Array:
+        """(SIZE, SIZE): of the points alone, in doubts; outliers say less."""
+        rows, by = (part[: self.count] for part in self.rows(scaled))
+        weight = self.huber(rows**2)[1]
+        return np.asarray(by.T @ (weight[:, None] * by))
+
+
+def _solved(cables: Cables, points: Points, doubts: Doubts, frame: Frame, noise: float) -> Calibrated:
+    problem = _Problem(cables, points, doubts, frame, noise)
     answer = least_squares(
-        lambda x: at(x.tobytes())[0],
-        start,
-        jac=lambda x: at(x.tobytes())[1],
-        loss=huber,
+        problem.residuals,
+        np.zeros(len(problem.each)),
+        jac=problem.jacobian,
+        loss=problem.huber,  # type: ignore[arg-type]  # the manual: (3, K)
         xtol=1e-10,
         ftol=1e-10,
     )
-    rows, by = whole(answer.x)
-    weight = huber(rows**2)[1][:count, None]
-    information = by[:count].T @ (weight * by[:count])
-    covariance = np.linalg.inv(information + np.eye(len(each)))
-    parameters = each * answer.x
+    information = problem.information(answer.x)
+    covariance = np.linalg.inv(information + np.eye(len(problem.each)))
+    parameters = problem.each * answer.x
     residual = points.place - predicted(cables, frame, parameters, points.slider)
-    scaled = np.outer(each, each) * covariance
+    scaled = np.outer(problem.each, problem.each) * covariance
     return Calibrated(cables, frame, doubts, parameters, scaled, noise, residual, information)
 
 

@@ -24,7 +24,7 @@ from cdhr_host.profile import Profile
 from cdhr_host.profile.calibration import Calibration
 from cdhr_host.report.studies.poses import Poses, candidates, planned
 from cdhr_host.units import MM
-from cdhr_host.values import Array
+from cdhr_host.values import Array, Flags
 
 HELD_OUT: Final = 5
 """every fifth point judges a fit of the others"""
@@ -154,7 +154,7 @@ def _judged(cables: Cables, points: Points, doubts: Doubts, frame: Frame, noise:
     return Judged(int(aside.sum()), rms(before(cables, frame, judge)), rms(left))
 
 
-def _own(found: Calibrated, own: Array) -> Calibrated:
+def _own(found: Calibrated, own: Flags) -> Calibrated:
     """With nothing but the machine's own parameters in doubt: the measuring frame is not the nozzle's."""
     return replace(found, covariance=found.covariance * np.outer(own, own))
 

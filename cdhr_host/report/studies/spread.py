@@ -51,7 +51,7 @@ def _on_cluster(work: Callable[[J], R], jobs: Sequence[J], scheduler: str) -> It
     except ImportError as error:
         raise ClusterError("--scheduler needs Dask: pip install 'cdhr-host[dask]'") from error
     try:
-        client = Client(scheduler, timeout=PATIENCE)
+        client = Client(scheduler, timeout=PATIENCE)  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
         raise ClusterError(f"no Dask scheduler answers at {scheduler}: {error}") from error
     with client:
