@@ -195,9 +195,18 @@ class Acts:
         self.records.acknowledged()
 
     def check_override(self, flow: float | None) -> None:
-        """Raises JobError for a flow that the air cannot give."""
-        if self._program is not None and flow is not None:
-            self.player.check_flow(flow, self._program.proof)
+        """Raises JobError for more flow where what is to come is not known."""
+        if flow is not None and flow > 1.0 and self._lines.progress() is not None:
+            raise JobError(
+                Problem(
+                    "override",
+                    f"a flow of {flow:.0%} is not possible while lines are printed as they come",
+                    value=flow * 100,
+                    limit=100,
+                    unit="%",
+                    hint="send M221 with the lines, or print a file",
+                )
+            )
 
     def override(self, feed: float | None, flow: float | None, state: JobState) -> None:
         """Other shares from now on."""

@@ -1,11 +1,12 @@
-"""Feed overrides: below 100 % the plan is played slower, above it is planned anew and joined.
+"""Overrides: a feed below 100 % plays the plan slower, above it is planned anew and joined.
 
 The program as written is always at hand (``base``). Faster, another course is planned from
 the last border behind the machine on, with every feed multiplied; it leaves that border at
 the base's speed and is nowhere slower from there on. Where a played course at rate r has the
 speed r v and the other one v' at the same place, the other goes on at the rate r v / v',
 continuous in speed and acceleration, and is ramped to its own rate. Where v' is smaller the
-join waits: first the played course is slowed down, then both meet.
+join waits: first the played course is slowed down, then both meet. A flow above 100 % is
+pushed once a course is played that is slow enough for the air.
 """
 
 from contextlib import suppress
@@ -39,11 +40,15 @@ class Feeds:
         self.base: Course | None = None
         self._wanted = 1.0
         self._flow = 1.0
+        self._gain = 1.0
+        """of the flow, as it is played"""
         self._next_try = 0
 
-    def begin(self, base: Course, feed: float, flow: float) -> None:
-        """A program is begun as it is written."""
+    def begin(self, base: Course, feed: float, flow: float) -> float:
+        """A program is begun as it is written; the share of the flow that it can begin with."""
         self.base, self._wanted, self._flow, self._next_try = base, feed, flow, 0
+        self._gain = min(flow, 1.0)
+        return self._gain
 
     def end(self) -> None:
         """Nothing is played any more."""
@@ -59,8 +64,11 @@ class Feeds:
     def want(self, feed: float, flow: float, *, moving: bool) -> None:
         """Another feed from now on, at this share of the flow."""
         self._wanted, self._flow, self._next_try = feed, flow, 0
+        if flow < self._gain:
+            self._push(flow)
         if moving and not self._joined():
             self._changes.pace(self.rate)
+        self._push_more()
 
     def turn(self, *, moving: bool) -> None:
         """Join the right course once that is possible, and keep the base at hand."""
@@ -70,7 +78,20 @@ class Feeds:
         ready = self._feeder.settled and self._feeder.next_tick >= self._next_try
         if moving and ready and not self._right() and not self._joined():
             self._next_try = self._feeder.next_tick + round(AGAIN / self._feeder.period)
+        self._push_more()
         self._follow(base)
+
+    def _push_more(self) -> None:
+        """The flow that is wanted, once the plan that is played leaves the air room for it."""
+        score = self._feeder.score
+        if score is None or self._flow <= self._gain:
+            return
+        if self._flow <= max(1.0, score.last.course.staircase.feed_override.flow):
+            self._push(self._flow)
+
+    def _push(self, flow: float) -> None:
+        self._gain = flow
+        self._changes.flow(flow)
 
     def plan_time(self) -> float | None:
         """Ticks of the program as written that are done; None where that is not known."""
@@ -103,7 +124,7 @@ class Feeds:
         return score.last.course.staircase.feed_override == self._override()
 
     def _override(self) -> FeedOverride:
-        return FeedOverride(max(self._wanted, 1.0), max(self._flow, 1.0) if self._wanted > 1.0 else 1.0)
+        return FeedOverride(max(self._wanted, 1.0), max(self._flow, 1.0))
 
     def _joined(self) -> bool:
         """Join the right course soon; whether that was possible, or is the case already."""

@@ -16,11 +16,11 @@ from cdhr_host.job.feeder import Feeder
 from cdhr_host.job.feeds import Feeds
 from cdhr_host.job.program import Program
 from cdhr_host.job.short import furthest, proven, straight, through
-from cdhr_host.pipeline import Proof, Staircase
+from cdhr_host.pipeline import Staircase
 from cdhr_host.pipeline.course import Course, Stop
 from cdhr_host.pipeline.score import Gain
 from cdhr_host.pipeline.tape import Tape
-from cdhr_host.units import MM, MM3
+from cdhr_host.units import MM
 from cdhr_host.values import Array, Feedback, Pause, Setpoints
 
 STEP_SPEED: Final = 25 * MM
@@ -114,23 +114,6 @@ class Player:
         """s of the program as written that are done; ``before`` if that is not known."""
         u = self.feeds.plan_time() if self.kind is Kind.PROGRAM else None
         return before if u is None else u * self.profile.drives.period
-
-    def check_flow(self, share: float, proof: Proof) -> None:
-        """Raises JobError where the air cannot give this share of the flow a program needs."""
-        air = self.staircase.rig.air
-        most = proof.extremes["flow_mm3_s"][2] * MM3 if "flow_mm3_s" in proof.extremes else 0.0
-        if most > 0.0 and share > max(room := air.flow_max / most, 1.0):
-            raise JobError(
-                Problem(
-                    "override",
-                    f"a flow of {share:.0%} would be {share * most / MM3:.4g} mm³/s, "
-                    f"the air can push {air.flow_max / MM3:.4g} mm³/s",
-                    value=share * most / MM3,
-                    limit=air.flow_max / MM3,
-                    unit="mm³/s",
-                    hint=f"this program can have {math.floor(max(room, 1.0) * 100)} % at most",
-                )
-            )
 
     def cleared(self) -> None:
         """The part was taken off: nothing stands in the way of G28."""
@@ -296,14 +279,10 @@ class Player:
         if feed is not None or flow is not None:
             self.feed, self.gain = feed or self.feed, flow or self.gain
             self.feeds.want(self.feed, self.gain, moving=moving)
-        if flow is not None and self.kind is Kind.PROGRAM:
-            self.changes.flow(flow)
 
     def _play(self, kind: Kind, course: Course, rate: float) -> None:
-        share = self.gain if kind is Kind.PROGRAM else 1.0
+        share = self.feeds.begin(course, self.feed, self.gain) if kind is Kind.PROGRAM else 1.0
         self.feeder.begin(course, rate, Gain(share, share))
-        if kind is Kind.PROGRAM:
-            self.feeds.begin(course, self.feed, self.gain)
         self.changes.begin(rate)
         self.kind, self._course = kind, course
 

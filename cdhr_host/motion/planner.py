@@ -132,7 +132,7 @@ class Planner:
 
     @_take.register
     def _(self, command: Prime) -> Iterator[Stretch]:
-        flow = min(command.flow, self._limits.flow.greatest)
+        flow = min(command.flow, self._limits.flow.greatest / self.override.flow)
         return self._stand(command.clay / flow, flow, command.line)
 
     @_take.register(Pause | Stop)

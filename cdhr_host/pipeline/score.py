@@ -157,11 +157,11 @@ class Score:
         """Ticks that all fall on shifts, or all beside them."""
         shift = part.course.shift_at(float(beat.u[0]))
         if shift is not None:
-            return self.staircase.shifted(played_shift(shift, tick, beat, self.staircase.period))
+            return self.staircase.afresh().shifted(played_shift(shift, tick, beat, self.staircase.period))
         shaper = self.staircase.shaper
         copies = [self._copy(tick, delay / self.staircase.period, part, beat) for delay in shaper.delay]
         track = copies[0] if len(copies) == 1 else mean(copies, shaper)
-        return self.staircase.checked(self._pushed(track))
+        return self.staircase.afresh().checked(self._pushed(track))
 
     def _copy(self, tick: Ints, delay: float, part: Part, beat: Beat) -> ToolTrack:
         """The nozzle a while ago, unshaped."""

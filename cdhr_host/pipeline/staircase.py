@@ -274,6 +274,11 @@ class Staircase:
             (self._planner, self._timeline, self._offset), self._interpreter.modal = before
             raise
 
+    def afresh(self) -> "Staircase":
+        """Itself, which tells again what it has told before."""
+        self._audit = Audit(self.profile)
+        return self
+
     def checked(self, track: ToolTrack) -> Checked:
         """Samples of the nozzle -> setpoints of the machine, audited."""
         inside = on_bed(track.position_G, self.profile)
