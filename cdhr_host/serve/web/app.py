@@ -12,7 +12,7 @@ from cdhr_host.errors import JobError
 from cdhr_host.serve.folder import Entry
 from cdhr_host.serve.host import Host
 from cdhr_host.serve.script import Executor
-from cdhr_host.serve.web.gate import Gates
+from cdhr_host.serve.web.gate import PARSER_LOG, Gates
 from cdhr_host.serve.web.guard import LOG, Guard, guarded, refuse
 from cdhr_host.serve.web.methods import Methods, RpcError, gcodes_name
 from cdhr_host.serve.web.octoprint import OctoPrint
@@ -63,7 +63,9 @@ class HttpDoor:
     async def open(self) -> None:
         """Listen; OSError when the port is taken."""
         self._sockets = Sockets(self._host, self.methods)
-        self._runner = web.AppRunner(self._app(), access_log=None, handle_signals=False, shutdown_timeout=2.0)
+        self._runner = web.AppRunner(
+            self._app(), access_log=None, handle_signals=False, shutdown_timeout=2.0, logger=PARSER_LOG
+        )
         await self._runner.setup()
         assert self._runner.server is not None
         self.gates = Gates(self._runner.server)

@@ -1,14 +1,32 @@
 """Connections before they speak: how many there may be, and how long they may stay silent."""
 
 import asyncio
+import logging
 from typing import Final
 from weakref import WeakSet
 
 from aiohttp import web
+from aiohttp.http import HttpProcessingError
+
+from cdhr_host.serve.names import shown
 
 CONNECTIONS_MAX: Final = 64
 HEADERS_WITHIN: Final = 10.0
 """s for the first request's headers"""
+
+
+def _plainly(record: logging.LogRecord) -> bool:
+    """What is no HTTP is a client's slip: one line, no traceback."""
+    error = record.exc_info[1] if record.exc_info else None
+    if isinstance(error, HttpProcessingError):
+        record.msg, record.args = f"refused a request that is not HTTP: {shown(error.message, 200)}", ()
+        record.exc_info = record.exc_text = None
+        record.levelno, record.levelname = logging.WARNING, "WARNING"
+    return True
+
+
+PARSER_LOG: Final = logging.getLogger("cdhr.serve.http")
+PARSER_LOG.addFilter(_plainly)
 
 
 class Gates:

@@ -17,6 +17,8 @@ EVERY: Final = 1.0
 MESSAGE_MAX: Final = 1 << 20
 WAITING_MAX: Final = 64
 """messages a client may leave unread; then it is hung up on"""
+READS_WITHIN: Final = 30.0
+"""s a client may leave its answers unread"""
 CLIENTS_MAX: Final = 32
 
 
@@ -35,6 +37,11 @@ class Listener:
             self._waiting.put_nowait(text)
         except asyncio.QueueFull:
             self._writer.cancel()
+
+    async def answer(self, text: str) -> None:
+        """Send, and read no further call before there is room; TimeoutError when nothing is read."""
+        async with asyncio.timeout(READS_WITHIN):
+            await self._waiting.put(text)
 
     def end(self) -> None:
         """No more."""
@@ -80,7 +87,8 @@ class Sockets:
         self._listeners.add(listener)
         try:
             listener.tell(notification("notify_klippy_ready"))
-            await self._converse(socket, listener)
+            with suppress(TimeoutError):
+                await self._converse(socket, listener)
         finally:
             self._listeners.discard(listener)
             listener.end()
@@ -92,7 +100,7 @@ class Sockets:
                 continue
             answer = await answered(self._methods, listener.session, message.data)
             if answer is not None:
-                listener.tell(answer)
+                await listener.answer(answer)
 
     def push(self) -> None:
         """Tell everyone what has changed."""
