@@ -9,6 +9,7 @@ join waits: first the played course is slowed down, then both meet. A flow above
 pushed once a course is played that is slow enough for the air.
 """
 
+import math
 from contextlib import suppress
 from functools import partial
 from typing import Final
@@ -16,7 +17,7 @@ from typing import Final
 from cdhr_host.errors import CdhrError, MotionError
 from cdhr_host.job.changes import Changes
 from cdhr_host.job.feeder import KEPT, Feeder
-from cdhr_host.motion.leg import FeedOverride
+from cdhr_host.motion.leg import AS_PROGRAMMED, FeedOverride
 from cdhr_host.motion.playback import Pace, Start, landing, ramp
 from cdhr_host.motion.ramps import choices
 from cdhr_host.pipeline.course import Course
@@ -144,9 +145,10 @@ class Feeds:
         if base is None:
             return None
         there = u if course is base else self._on_base(course, u)
-        if override.factor == 1.0 or there is None:
+        if override == AS_PROGRAMMED or there is None:
             return base if there is not None else None
-        return base.hastened(there, override)
+        base.plan(math.ceil(there))
+        return base.hastened(there, override) if spot(base, there) is not None else None
 
     def _join(self, other: Course, tick: int) -> bool:
         """Play the other course from a tick on, if speed and limits allow it."""
