@@ -118,7 +118,7 @@ def test_a_fit_is_judged_by_points_it_has_not_seen_and_kept_as_a_profile() -> No
     points = measured(1)
     found = fit(PAPER, points, Doubts(), NOISE, free_frame=False)
     assert found.judged is not None
-    assert found.judged.points == 6
+    assert found.judged.points == 30
     assert found.judged.after < 0.1 * found.judged.before
     assert found.doubt[1] < 0.05 * found.doubt[0]
     assert rms(found.found.residual) < 3 * NOISE < rms(found.first)

@@ -26,8 +26,10 @@ from cdhr_host.report.studies.poses import Poses, candidates, planned
 from cdhr_host.units import MM
 from cdhr_host.values import Array, Flags
 
-HELD_OUT: Final = 5
-"""every fifth point judges a fit of the others"""
+FOLDS: Final = 5
+"""every fifth point judges a fit of the others, five times"""
+BETTER: Final = 0.9
+"""of the drawing's error at most: less of a gain may be chance"""
 FEWEST: Final = 10
 """points for that"""
 DIGITS: Final = 6
@@ -36,7 +38,7 @@ DIGITS: Final = 6
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """rms distances of points that a fit did not see, m: by the drawing, and by the fit."""
+    """rms distances, m: by the drawing, and each by a fit that did not see the point."""
 
     points: int
     before: float
@@ -45,7 +47,7 @@ class Judged:
     @property
     def better(self) -> bool:
         """Whether the fit tells more than the drawing."""
-        return self.after < self.before
+        return self.after < BETTER * self.before
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,13 +147,15 @@ def _frame(cables: Cables, points: Points) -> Frame:
 
 
 def _judged(cables: Cables, points: Points, doubts: Doubts, frame: Frame, noise: float) -> Judged | None:
+    """Each point is predicted by a fit that has not seen it."""
     if len(points) < FEWEST:
         return None
-    aside = np.arange(len(points)) % HELD_OUT == HELD_OUT - 1
-    others = calibrate(cables, points[~aside], doubts, frame, noise)
-    judge = points[aside]
-    left = judge.place - others.predicted(judge.slider)
-    return Judged(int(aside.sum()), rms(before(cables, frame, judge)), rms(left))
+    left = np.empty_like(points.place)
+    for fold in range(FOLDS):
+        aside = np.arange(len(points)) % FOLDS == fold
+        others = calibrate(cables, points[~aside], doubts, frame, noise)
+        left[aside] = points.place[aside] - others.predicted(points.slider[aside])
+    return Judged(len(points), rms(before(cables, frame, points)), rms(left))
 
 
 def _own(found: Calibrated, own: Flags) -> Calibrated:

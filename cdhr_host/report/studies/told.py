@@ -33,8 +33,8 @@ def _summary(fit: GeometryFit) -> Iterator[str]:
     yield f"  distance, rms: {first:.3f} mm by the drawing, {last:.3f} mm by the fit"
     if judged:
         first, last = judged.before / MM, judged.after / MM
-        told = f"{first:.3f} mm by the drawing, {last:.3f} mm by a fit of the others"
-        yield f"  {judged.points} points held out: {told}"
+        told = f"{first:.3f} mm by the drawing, {last:.3f} mm by fits of the others"
+        yield f"  {judged.points} points held out, a fifth at a time: {told}"
     first, last = (size / MM for size in fit.doubt)
     yield f"  nozzle, worst place of the workspace, one sigma: {first:.2f} mm before, {last:.3f} mm now"
     if wild := np.flatnonzero(found.outliers).tolist():
