@@ -119,6 +119,7 @@ class View {
   // quick while something moves; whole as soon as it rests
   draw(quick = false) {
     this.quick = quick;
+    clearTimeout(this.rest);
     this.asked ??= requestAnimationFrame((now) => {
       this.asked = undefined;
       this.fit();
@@ -126,12 +127,16 @@ class View {
       this.matrix = this.camera.matrix(width / Math.max(height, 1));
       this.scene.draw(this.matrix, this.range(), { ...this.inks(), travel: this.travel, quick: this.quick });
       this.pins?.forEach((pin) => this.pin(pin, width, height));
-      if (this.quick) requestAnimationFrame((next) => this.scene.pace?.(next - now));
+      if (this.quick) requestAnimationFrame((next) => this.shown(next - now));
       document.documentElement.dataset.frames = String(Number(document.documentElement.dataset.frames || 0) + 1);
     });
-    if (!quick) return;
+  }
+
+  // a quick frame is on the screen; if nothing else moves, a whole one follows
+  shown(took) {
+    this.scene.pace?.(took);
     clearTimeout(this.rest);
-    this.rest = setTimeout(() => this.draw(), 160);
+    if (!this.asked) this.rest = setTimeout(() => this.draw(), 160);
   }
 
   inks() {

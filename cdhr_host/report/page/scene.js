@@ -44,6 +44,7 @@ void main() {
   colour = vec4(laid > 0.0 ? plain * shade * round_ : travelColour, 1.0);
 }`;
 const FEW = 40000; // segments drawn at once while the view moves, to begin with
+const WHOLE = 40; // times as many when it rests: a machine that draws slowly never draws them all
 
 class Scene {
   constructor(canvas, trail) {
@@ -161,7 +162,7 @@ class Scene {
 
   path(first, last, travel, quick) {
     const gl = this.gl, { low, high } = this.trail.facts.box, { spread, marks, values } = this.shown;
-    this.step = quick ? Math.max(1, Math.ceil((last - first) / this.few)) : 1;
+    this.step = Math.max(1, Math.ceil((last - first) / (quick ? this.few : WHOLE * this.few)));
     this.uniform("3f", "low", ...low);
     this.uniform("3f", "extent", ...high.map((each, k) => each - low[k]));
     this.uniform("1f", "still", 0);
