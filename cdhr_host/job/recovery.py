@@ -95,6 +95,12 @@ class Resuming:
             course.skip(course.staircase.tick + 1)
         return Recovery(tick, self._line(course, tick), self._place(course, tick), tick, tick, 0.0, 0.0, True)
 
+    def length(self, first: float, last: float) -> float:
+        """m of path between two ticks of the plan."""
+        course = self._course(first)
+        course.plan(math.ceil(last) + 1)
+        return self._length(course, first, last)
+
     def aside(self, tick: float) -> Aside:
         """The program, standing at a tick of its plan, to be gone on with."""
         course = self._course(tick)
@@ -135,7 +141,7 @@ class Resuming:
         rested = rested if stop is None else min(rested, stop.tick - 1.0)
         tick = self._before(course, bead, overlap)
         line, place = self._line(course, tick), self._place(course, tick)
-        twice = self._length(course, tick, bead if sure else rested)
+        twice = self._length(course, tick, bead if sure else rested) + away
         return Recovery(tick, line, place, bead, rested, twice, away, sure)
 
     def _check_plan(self, course: Course, last: Executed) -> None:

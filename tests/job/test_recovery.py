@@ -186,3 +186,42 @@ def test_a_print_goes_on_at_a_line(tmp_path: Path, program: Program, whole: Setp
     assert machine.run(printer) is JobState.DONE
     assert min(int(rows.line.min()) for rows in machine.laid) == 20
     printer.close()
+
+
+def test_a_journal_cut_anywhere_resumes_rightly_or_says_why_not(tmp_path: Path, program: Program) -> None:
+    """Never a millimetre skipped, never one laid twice beyond the overlap that is stated."""
+    machine = interrupted(tmp_path, program, 6.1)
+    machine.link.open()
+    way, slider = Resuming(program, RIG), machine.link.slider
+    measured = RIG.standing(slider)[0]
+    path = machine.journal.path
+    whole = path.read_bytes()
+    true = way.found(read_journal(path), measured, machine.link.stop_rows, OVERLAP)
+    ends = [at + 1 for at, byte in enumerate(whole) if byte == 0x0A]
+    random = np.random.default_rng(5).integers(0, len(whole), 1000).tolist()
+    known: dict[tuple[object, ...], Recovery | None] = {}
+    for size in {*ends, *random}:
+        path.write_bytes(whole[:size])
+        try:
+            cut = read_journal(path)
+        except JobError:
+            assert size < ends[0]
+            continue
+        what = cut.executed, cut.fed, cut.state
+        if what not in known:
+            known[what] = _tried(way, cut, measured, machine)
+        found = known[what]
+        if found is not None:
+            laid_twice = way.length(found.tick, true.bead)
+            assert found.tick <= true.bead
+            assert laid_twice <= found.overlap + 0.05 * MM
+    assert sum(found is not None for found in known.values()) > 10
+
+
+def _tried(way: Resuming, journal: Journal, measured: np.ndarray, machine: Machine) -> Recovery | None:
+    try:
+        return way.found(journal, measured, machine.link.stop_rows, OVERLAP)
+    except JobError as error:
+        if not error.problems[0].hint:
+            raise
+        return None
