@@ -1,10 +1,12 @@
 """The cyclic sender on a pseudo-terminal: lateness, skipped cycles, CPU of the sender.
 
-    python benchmarks/drives.py --seconds 60 --hz 250
-    python benchmarks/drives.py --seconds 300 --hz 500
+    python benchmarks/drives.py --minutes 30 --rate 250
+    python benchmarks/drives.py --minutes 5 --rate 500
+    python benchmarks/drives.py --stops 20 --rate 250
 
 At 500 Hz the drives answer every fourth SYNC. Needs an otherwise idle machine; real-time priority
-is used where it is allowed.
+is used where it is allowed. ``--stops`` stops that many runs on the path, at random, and tells the
+lateness of the cycles around each stop.
 """
 
 import argparse
@@ -14,6 +16,9 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -69,8 +74,9 @@ def cpu(pid):
     return (int(values[11]) + int(values[12])) / TICK
 
 
-def measure(seconds, hz):
-    """One run; a record."""
+@contextmanager
+def opened(hz):
+    """An open link to simulated drives, the profile, and where their report will be."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         path = profile_at(hz, folder)
@@ -81,13 +87,62 @@ def measure(seconds, hz):
         url = far.stdout.readline().strip()
         link = SenderLink(url, profile, folder / "references.json")
         link.open()
+        yield link, profile, far, record.with_suffix(".json")
+
+
+def ended(link, far):
+    """Close both sides."""
+    link.close()
+    far.send_signal(signal.SIGTERM)
+    far.wait()
+
+
+def stops(count, hz):
+    """Runs that are stopped at random; a record."""
+    chance, found, start = np.random.default_rng(1), [], np.zeros(6)
+    with opened(hz) as (link, profile, far, _):
+        for _ in range(count):
+            timing, start = stopped(link, profile, start, chance.uniform(1.0, 2.0))
+            found.append(timing)
+        ended(link, far)
+    return {
+        "hz": hz,
+        "stops": count,
+        "real_time": found[-1].real_time,
+        "worst_p999_ms": round(max(timing.p999 for timing in found) * 1e3, 3),
+        "worst_ms": round(max(timing.max for timing in found) * 1e3, 3),
+        "skipped": sum(timing.skipped for timing in found),
+    }
+
+
+def stopped(link, profile, start, after):
+    """A run from ``start`` that is stopped ``after`` s: its timing, and where it stands."""
+    at, end = [start], time.monotonic() + after
+    summary = stream(
+        ahead(start, 4000, profile.drives.period),
+        link,
+        MonotonicClock(),
+        start=start,
+        on_rows=lambda executed, _: at.append(executed.slider[-1]),
+        should_stop=lambda: time.monotonic() > end,
+    )
+    return summary.timing, at[-1]
+
+
+def ahead(start, count, period):
+    """``rows`` that begin where the sliders stand."""
+    for batch in rows(count, period):
+        yield replace(batch, slider=batch.slider + start)
+
+
+def measure(seconds, hz):
+    """One run; a record."""
+    with opened(hz) as (link, profile, far, report):
         count = int(seconds * hz)
         before = cpu(link.pid)
         summary = stream(rows(count, profile.drives.period), link, MonotonicClock(), start=np.zeros(6))
         used = cpu(link.pid) - before
-        link.close()
-        far.send_signal(signal.SIGTERM)
-        far.wait()
+        ended(link, far)
         timing = summary.timing
         return {
             "hz": hz,
@@ -99,17 +154,21 @@ def measure(seconds, hz):
             "max_ms": round(timing.max * 1e3, 3),
             "skipped": timing.skipped,
             "sender_cpu_percent": round(100 * used / summary.duration, 1),
-            "lost_ticks": json.loads(record.with_suffix(".json").read_text())["lost_ticks"],
+            "lost_ticks": json.loads(report.read_text())["lost_ticks"],
         }
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--seconds", type=float, default=60.0)
-    parser.add_argument("--hz", type=int, default=250)
+    parser.add_argument("--minutes", type=float, default=1.0)
+    parser.add_argument("--rate", type=int, default=250, help="Hz")
+    parser.add_argument("--stops", type=int, default=0)
     parser.add_argument("--smoke", action="store_true", help="three seconds")
     arguments = parser.parse_args()
-    print(json.dumps(measure(3.0 if arguments.smoke else arguments.seconds, arguments.hz)))
+    if arguments.stops:
+        print(json.dumps(stops(arguments.stops, arguments.rate)))
+    else:
+        print(json.dumps(measure(3.0 if arguments.smoke else 60.0 * arguments.minutes, arguments.rate)))
 
 
 if __name__ == "__main__":

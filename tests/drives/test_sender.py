@@ -7,12 +7,12 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
-from trajectories import PAPER, run_of
+from trajectories import PAPER, changed, run_of
 
 from cdhr_host.drives import LinkState, MonotonicClock
 from cdhr_host.drives.rows import joined
@@ -125,9 +125,7 @@ def test_revision_is_carried_out_by_the_sender(tmp_path, later):
     """The rows of the sender's own buffer, or those still in the ring, are replaced at one tick."""
     with running(tmp_path) as (far, link, rows):
         _until(lambda: link.feedback() is not None and link.buffered < 800)
-        first = link.revisable + later
-        hold = path_true_stop(rows[first:1024], PATIENT)
-        link.revise(hold)
+        first, hold = _held(link, rows, later)
         with pytest.raises(DriveError, match="can no longer be replaced"):
             link.revise(rows[10:500])
         _until(lambda: len(link.feedback()) >= 0 and link.buffered == 0)
@@ -138,6 +136,34 @@ def test_revision_is_carried_out_by_the_sender(tmp_path, later):
     wanted = np.rint(np.vstack([rows.slider[:first], hold.slider]) / link.resolution)
     begin = _where(received, wanted[:50])
     assert (received[begin : begin + len(wanted)] == wanted).all()
+
+
+def test_rows_of_a_stopped_run_are_not_played_in_the_next(tmp_path):
+    with running(tmp_path) as (far, link, _):
+        _until(lambda: link.feedback() is not None and link.buffered < 900)
+        link.stop()
+        parts = []
+        _until(lambda: parts.append(link.feedback()) or link.state is LinkState.STOPPED)
+        stands = link.slider
+        again = run_of(200)
+        link.arm(stands)
+        link.feed(changed(again, slider=again.slider + stands))
+        got = []
+        _until(lambda: got.append(link.feedback()) or link.buffered == 0)
+        assert (joined(got).tick == again.tick).all()
+        link.stop()
+        assert far.end()["at_rest"]
+
+
+def _held(link, rows, later):
+    """Revise as a job does: plan anew where the computer was too slow for the tick it had chosen."""
+    for _ in range(50):
+        first = link.revisable + later
+        hold = path_true_stop(rows[first:1024], PATIENT)
+        with suppress(DriveError):
+            link.revise(hold)
+            return first, hold
+    raise AssertionError("always too late")
 
 
 def _where(received, wanted):

@@ -186,6 +186,7 @@ class Sender:
         if not self._punctual and not self._profile.canopen.allow_soft_realtime:
             raise fault("jitter", "the timing test failed: setpoints would come too late")
         self._link.arm(np.array(start))
+        self._rows.cut(0)
 
     def _do_stop(self) -> None:
         self._take_rows()

@@ -94,6 +94,7 @@ class SenderLink:
         self._fault_if_known()
         self._ask("arm", [float(at) for at in np.ravel(start)])
         self._tail, self._next_tick = np.array(start), None
+        self._results.take(RESULTS)
         self._fed = self._collected = 0
         self.stop_tick = None
 
