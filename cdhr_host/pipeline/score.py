@@ -108,9 +108,10 @@ class Score:
         start = part.pace.start(float(tick))
         return part.course, start.u, start.rate
 
-    def before(self, tick: int) -> Setpoints:
-        """The rows just before a tick, as many as a change's jerk sees."""
-        return self.rows(max(tick - HISTORY, self.parts[0].tick), tick)[0]
+    def before(self, tick: int) -> Setpoints | None:
+        """The rows just before a tick, as many as a change's jerk sees; None at the beginning."""
+        first = max(tick - HISTORY, self.parts[0].tick)
+        return self.rows(first, tick)[0] if first < tick else None
 
     def rows(self, first: int, last: int) -> tuple[Setpoints, Stop | None, bool]:
         """Rows of ticks first to last - 1 at most, the stop they reach, and whether they end at rest.

@@ -137,7 +137,7 @@ class Staircase:
         """Go up from where the nozzle stands, if pauses lift."""
         yield from self._brought_to_rest()
         way = lifted(self._planner.standing.at_G, self.profile, line)
-        if way is not None:
+        if way is not None and self._way_down is None:
             up, self._way_down = way
             for stretch in self._planner.stretches(up):
                 yield self._timeline.lay(stretch)
