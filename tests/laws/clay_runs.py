@@ -99,7 +99,7 @@ class Player:
             now = self._tick_at(change.at)
             if now is None or self._ends_within(now):
                 continue
-            self._make(now + BUFFER)
+            self._make(now + BUFFER + self.stage.lead)
             self._change(now, change.rate)
             if change.rate == 0.0:
                 while not self._make(self.made + CHUNK):
@@ -122,7 +122,7 @@ class Player:
 
     def _ends_within(self, now):
         u = self.score.last.pace.start(float(now)).u
-        return u + longest(self.profile) / self.period + BUFFER > self.end
+        return u + longest(self.profile) / self.period + BUFFER + self.stage.lead > self.end
 
     def _make(self, until):
         """Rows up to a tick; whether they end at rest."""
