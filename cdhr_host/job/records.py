@@ -78,7 +78,8 @@ class Records:
         if event.kind != "state":
             self._recorder.event(event.kind, event.text)
             return
+        state = event.status.state.value
         with suppress(JobError):  # a full disk has an alarm of its own, and must not end the telling
-            self._recorder.turned(event.status.state.value, event.text)
+            self._recorder.turned(state, "" if event.text == state else event.text)
         if event.status.state is JobState.DONE:
             self._recorder.end()
