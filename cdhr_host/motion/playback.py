@@ -20,7 +20,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial.polynomial import polyder, polyint
 
 from cdhr_host.values import Array, ToolTrack
 
@@ -67,9 +66,9 @@ class Ramp:
         scale = self._scale
         z: Array = (t - self.begin) / scale
         return Beat(
-            self.u + scale * _value(polyint(self.rate), z),
+            self.u + scale * _value(_areas(self.rate), z),
             _value(self.rate, z),
-            _value(polyder(self.rate), z) / scale,
+            _value(_slopes(self.rate), z) / scale,
         )
 
     def start(self, t: float) -> "Start":
@@ -93,6 +92,16 @@ def _value(powers: Array, z: Array) -> Array:
     for power in powers[-2::-1]:
         value = value * z + power
     return value
+
+
+def _areas(powers: Array) -> Array:
+    """(K,) coefficients by ascending powers -> (K + 1,) of the integral from 0."""
+    return np.concatenate(([0.0], powers / np.arange(1.0, len(powers) + 1.0)))
+
+
+def _slopes(powers: Array) -> Array:
+    """(K,) coefficients by ascending powers -> those of the derivative."""
+    return np.concatenate((powers[1:] * np.arange(1.0, len(powers)), [0.0]))
 
 
 def steady(begin: float, u: float, rate: float) -> Ramp:

@@ -121,7 +121,7 @@ class Staircase:
 
     def _dried(self, command: Command) -> Iterator[Timed]:
         """Stand where a layer that took too little time ends."""
-        if not self._layers.ends(command):
+        if not isinstance(command, Notice) or not self._layers.ends(command):
             return
         yield from self._brought_to_rest()
         missing = self._layers.missing(self._timeline.now)
