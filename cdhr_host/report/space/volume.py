@@ -17,7 +17,7 @@ def volume_lines(chart: MarginMap, space: Workspace) -> list[str]:
     policy = space.profile.spring.policy
     head = f"wrench-feasible under its policy {policy}: {chart.volume() / LITRE:.1f} l"
     if not chart.feasible.any():
-        return [f"{head}; no place has all nine cables inside their windows"]
+        return [f"{head}; no place keeps all its limits"]
     low, high = _heights(chart, space)
     r, turn, h = _middle(chart)
     where = (

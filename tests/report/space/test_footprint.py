@@ -7,7 +7,9 @@ from cdhr_host.mechanism import Workspace
 from cdhr_host.mechanism.margin_map import margin_map
 from cdhr_host.pipeline import open_profile, prove
 from cdhr_host.report.space.footprint import Footprint
+from cdhr_host.report.space.pictures import draw_map
 from cdhr_host.report.space.sited import sited, sited_lines, sited_record
+from cdhr_host.report.space.volume import volume_lines, volume_record
 from cdhr_host.units import MM
 
 PART = b"M83\nG1 X150 F3000\nG1 Z2\nG1 X90 E300\nG1 Y40 E200\nG1 X150 E300\nG1 Z40\nG1 X0 Y0\n"
@@ -62,3 +64,13 @@ def test_the_best_place_holds_when_it_is_taken(paper):
     moved = Workspace.from_profile(paper.model_copy(update={"bed": bed}))
     q = found.places_G - moved.cables.reference_G
     assert moved.margin(q).min() == pytest.approx(found.space.margin, abs=1e-9)
+
+
+def test_a_machine_that_can_hold_nothing_is_told_and_drawn(paper, tmp_path):
+    sliders = paper.sliders.model_copy(update={"travel_min": 0.5, "travel_max": 0.6})
+    space = Workspace.from_profile(paper.model_copy(update={"sliders": sliders}))
+    chart = margin_map(space)
+    assert "no place keeps all its limits" in volume_lines(chart, space)[0]
+    assert volume_record(chart, space)["heights_mm"] is None
+    draw_map(chart, space, None, "nothing", tmp_path / "nothing.png")
+    assert (tmp_path / "nothing.png").stat().st_size > 10_000
