@@ -145,7 +145,7 @@ def test_a_terminal_is_asked(
 ) -> None:
     from cdhr_host.cli import calibrate_geometry
 
-    table, mine = measured(tmp_path, 4), tmp_path / "asked.toml"
+    table, mine = measured(tmp_path, 1, 0.2), tmp_path / "asked.toml"
     for stream in ("stdin", "stderr"):
         monkeypatch.setattr(f"sys.{stream}.isatty", lambda: True, raising=False)
     answers = iter(["", str(mine)])
