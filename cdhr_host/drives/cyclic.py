@@ -115,6 +115,7 @@ class CyclicLink(BufferedLink):
             port.close()
             raise
         self._machine, self._planner = machine, ThreadPoolExecutor(1, "stop")
+        self._planner.submit(int)  # starts the thread now, not in the cycle that wants to stop
         self._reference.adopt(machine)
         self._scaling = Scaling(self.profile, self._reference.zero)
         self.state = LinkState.OPEN

@@ -38,6 +38,9 @@ class Watch:
         self._axes = axes
         self._heartbeat = settings.heartbeat
         soft = round(SOFT_SILENCE / profile.drives.period) if settings.allow_soft_realtime else 0
+        self._strict = not settings.allow_soft_realtime
+        watchdog = 0 if self._strict else round(settings.setpoint_watchdog / profile.drives.period)
+        self._unfollowing = max(UNFOLLOWING, watchdog)
         self._patience = max(FEEDBACK_LOST * settings.feedback_every, soft)
         reach = profile.sliders.speed_max * profile.drives.period * settings.feedback_every
         self._jump = (3.0 * reach + profile.drives.following_error_max) / settings.position_unit
@@ -54,7 +57,7 @@ class Watch:
         """Everything wrong in this cycle."""
         yield from self._nodes(now)
         yield from self._emergencies()
-        if streaming and self.enabled and all(self._starved(axis) for axis in self._axes):
+        if streaming and self.enabled and self._strict and all(map(self._starved, self._axes)):
             yield fault("setpoint-late", "the drives did not get two setpoints in a row")
         for axis in self._axes:
             yield from self._feedback(axis)
@@ -144,5 +147,5 @@ class Watch:
             axis.word = DISABLE_VOLTAGE
             yield fault("following-error", f"{name} reports a following error")
         axis.unfollowing = 0 if axis.status & FOLLOWS_TARGET else axis.unfollowing + 1
-        if axis.unfollowing == UNFOLLOWING:
+        if axis.unfollowing == self._unfollowing:
             yield fault("not-following", f"{name} does not follow its target (status word bit 12)")

@@ -47,8 +47,8 @@ class Bridge:
     """Bytes in, bytes out, outputs in between.
 
     ``received`` has each output once: six position units and the pressure; ``trace`` the time,
-    six real positions, the pressure and whether it was an output of the plan. An output more
-    than a period and ``grace`` s late is a fault, not played in a burst.
+    six real positions, the pressure, whether it was an output of the plan, and the clay that left the
+    nozzle, mm³/s. An output more than a period and ``grace`` s late is a fault, not played in a burst.
     """
 
     def __init__(
@@ -287,7 +287,7 @@ class Bridge:
     def _vent(self) -> None:
         if self.air:
             self.air = 0
-            self.trace.append((self._now, *self._motors.position, 0, False))
+            self.trace.append((self._now, *self._motors.position, 0, False, self._motors.deposited))
 
     def _execute(self, tick: Tick) -> None:
         self.air = tick[12]
@@ -297,7 +297,8 @@ class Bridge:
         )
         self.received.append((*tick[:6], tick[12]))
         fresh = self.state is not State.STOPPING
-        self.trace.append((self._executed_at, *self._motors.position, tick[12], fresh))
+        row = *self._motors.position, tick[12], fresh, self._motors.deposited
+        self.trace.append((self._executed_at, *row))
         self._output += 1
         if beyond is not None:
             self._trip(Code.FOLLOWING, beyond)

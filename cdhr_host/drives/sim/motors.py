@@ -7,7 +7,7 @@ import numpy as np
 from cdhr_host.drives.sim.store import Tick
 from cdhr_host.plant import Disturbance, Machine
 from cdhr_host.profile.schema import Profile
-from cdhr_host.units import KPA
+from cdhr_host.units import KPA, MM3
 from cdhr_host.values import Setpoints
 
 
@@ -26,6 +26,8 @@ class Motors:
         self.position: Tick = (0,) * 6
         self.torque: Tick = (0,) * 6
         self.pressure = 0
+        self.deposited = 0.0
+        """mm³/s that left the nozzle"""
 
     def stand(self, start: Tick) -> None:
         """Held at ``start``, at rest."""
@@ -38,6 +40,7 @@ class Motors:
         self.position = tuple(int(v) for v in np.rint(feedback.slider[0] / self._unit))
         self.torque = tuple(int(v) for v in np.rint(feedback.torque[0] / self._rated * 1e3))
         self.pressure = round(feedback.pressure[0] / (0.1 * KPA))
+        self.deposited = float(feedback.deposited[0]) / MM3
         away = [abs(a - b) for a, b in zip(self.position, tick[:6], strict=True)]
         return away.index(max(away)) if max(away) > self._window else None
 

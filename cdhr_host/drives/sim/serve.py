@@ -39,7 +39,7 @@ class Serial(Protocol):
 
     @property
     def trace(self) -> list[tuple[float, ...]]:
-        """Each period: monotonic time, six real positions, raw pressure, whether setpoints were fresh."""
+        """Each period: monotonic time, six real positions, raw pressure, whether fresh, clay laid in mm³/s."""
         ...
 
 
@@ -153,8 +153,12 @@ def keep_record(far: Serial, path: Path) -> None:
 
 def keep_trace(far: Serial, path: Path) -> None:
     """Write what the simulated machine did, period by period, as CSV."""
-    header = ",".join(["time_s", *(f"slider{k + 1}_counts" for k in range(6)), "pressure_raw", "fresh"])
-    rows = (f"{row[0]:.6f}," + ",".join(str(int(value)) for value in row[1:]) for row in far.trace)
+    sliders = [f"slider{k + 1}_counts" for k in range(6)]
+    header = ",".join(["time_s", *sliders, "pressure_raw", "fresh", "deposited_mm3_s"])
+    rows = (
+        f"{row[0]:.6f}," + ",".join(str(int(value)) for value in row[1:-1]) + f",{row[-1]:.6g}"
+        for row in far.trace
+    )
     path.write_text("\n".join([header, *rows]) + "\n", encoding="ascii")
 
 

@@ -30,8 +30,8 @@ class Station:
     """The far side of the bus.
 
     ``received`` has six position units and the raw pressure of each cycle in which all six
-    axes followed a fresh setpoint, ``trace`` has time, six real positions, the raw pressure and
-    whether the setpoints were fresh for every cycle. ``lost`` counts cycles in which an axis had to guess.
+    axes followed a fresh setpoint, ``trace`` has time, six real positions, the raw pressure, whether
+    the setpoints were fresh, and the clay that left the nozzle, mm³/s, for every cycle. ``lost`` counts cycles in which an axis had to guess.
     Silence is judged ``grace`` s late, for wires that deliver late themselves.
     ``inbound`` and ``outbound`` stand for the wire: each frame becomes none, one or more.
     """
@@ -163,7 +163,8 @@ class Station:
         self.coupler.measured(self._raw(feedback))
         if len(self.trace) < LIMIT:
             fresh = all(drive.following and drive.fresh for drive in self.drives)
-            self.trace.append((now, *positions.tolist(), self.coupler.output, fresh))
+            laid = float(feedback.deposited[0]) / MM3
+            self.trace.append((now, *positions.tolist(), self.coupler.output, fresh, laid))
 
     def _row(self) -> Setpoints:
         slider = np.array([[(drive.commanded + drive.shift) * self._unit for drive in self.drives]])
