@@ -39,7 +39,9 @@ def sim(
     ] = None,
     trace: Annotated[
         Path | None,
-        typer.Option(metavar="CSV", help="At the end write where the sliders were, period by period."),
+        typer.Option(
+            metavar="CSV", help="At the end write where the sliders were and what clay was laid, by periods."
+        ),
     ] = None,
 ) -> None:
     """Be six drives, a pressure regulator and the machine behind them, until interrupted.

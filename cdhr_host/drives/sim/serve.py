@@ -39,7 +39,7 @@ class Serial(Protocol):
 
     @property
     def trace(self) -> list[tuple[float, ...]]:
-        """Each period: monotonic time, six real positions, raw pressure, whether fresh, clay laid in mm³/s."""
+        """Each period: monotonic time, six real positions, raw pressure, whether fresh, clay in mm³/s."""
         ...
 
 

@@ -12,6 +12,7 @@ from cdhr_host.drives.sim.identity import identify
 from cdhr_host.drives.sim.node import Frame, Nmt, Node
 from cdhr_host.plant import Disturbance, Machine, undisturbed
 from cdhr_host.profile.schema import Profile
+from cdhr_host.units import MM3
 from cdhr_host.values import Array, Feedback, Setpoints
 
 SYNC = 0x80
@@ -31,7 +32,8 @@ class Station:
 
     ``received`` has six position units and the raw pressure of each cycle in which all six
     axes followed a fresh setpoint, ``trace`` has time, six real positions, the raw pressure, whether
-    the setpoints were fresh, and the clay that left the nozzle, mm³/s, for every cycle. ``lost`` counts cycles in which an axis had to guess.
+    the setpoints were fresh, and the clay that left the nozzle, mm³/s, for every cycle. ``lost`` counts
+    cycles in which an axis had to guess.
     Silence is judged ``grace`` s late, for wires that deliver late themselves.
     ``inbound`` and ``outbound`` stand for the wire: each frame becomes none, one or more.
     """
