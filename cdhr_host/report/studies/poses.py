@@ -49,7 +49,7 @@ def candidates(profile: Profile, margin: float = MARGINS[0]) -> Poses:
     )
     places = np.column_stack([(r * np.cos(turn)).ravel(), (r * np.sin(turn)).ravel(), z.ravel()])
     scaled = np.vstack([places * share for share in SHARES])
-    kept = np.unique(np.round(scaled[_bears(profile, scaled, margin)], 6), axis=0)
+    kept = np.unique(np.round(scaled[_bears(profile, scaled, margin)], 6) + 0.0, axis=0)
     if not len(kept):
         raise MotionError(
             Problem(
