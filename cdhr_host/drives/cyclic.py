@@ -9,7 +9,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -68,6 +68,7 @@ class CyclicLink(BufferedLink):
         self._rested_at: float | None = None
         self._pressure = 0.0
         self._playing = False
+        self._told_before: deque[Array] = deque(maxlen=1)
         self._planner: ThreadPoolExecutor | None = None
         self._planning: Future[Setpoints] | None = None
 
@@ -132,6 +133,7 @@ class CyclicLink(BufferedLink):
         self.machine.lateness.reset()
         self._buffer.start(start)
         self._flying.clear()
+        self._told_before = deque(maxlen=self.machine.watch.stale)
         self._playing = False
         self.stop_tick, self._rested_at = None, None
         self.state = LinkState.ARMED
@@ -266,11 +268,22 @@ class CyclicLink(BufferedLink):
         if done is not None:
             feedback = self._outcome(done)
             self._executed.append(feedback)
-            found = first_fault(done.row, feedback, self.profile.drives)
+            found = first_fault(done.row, self._judged(done, feedback), self.profile.drives)
             if found is not None:
                 self._trip(found[1])
         for finding in self._watched(self._clock.now()):
             self._trip(finding)
+
+    def _judged(self, done: _Sent, feedback: Feedback) -> Feedback:
+        """What the position is compared with: the nearest setpoint it may be the answer to.
+
+        An answer may be some cycles old where drives answer every n-th SYNC, and where soft real
+        time is allowed.
+        """
+        self._told_before.append(self._scaling.slider(done.counts))
+        known = np.array(self._told_before)
+        nearest = np.clip(feedback.slider, known.min(axis=0), known.max(axis=0))
+        return replace(feedback, setpoint=nearest)
 
     def _watched(self, now: float) -> Iterator[DriveError]:
         if self.state not in (LinkState.ARMED, *MOVING):

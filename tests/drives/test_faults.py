@@ -16,6 +16,7 @@ from cdhr_host.drives import LinkState
 from cdhr_host.drives.canopen.scaling import Scaling
 from cdhr_host.drives.reference import ReferenceStore
 from cdhr_host.errors import DriveError
+from cdhr_host.job import stream
 from cdhr_host.plant.disturbances import Stuck
 
 ZERO = np.zeros(6)
@@ -286,4 +287,27 @@ def test_stored_reference_is_where_the_sliders_are_told_from(tmp_path):
     bench.link.close()
     bench.link.open()
     assert bench.link.slider == pytest.approx(ZERO, abs=1e-6)
+    bench.close()
+
+
+@pytest.mark.parametrize("soft", [True, False])
+def test_4_answers_that_come_40_ms_late_are_no_following_error(soft):
+    """Where soft real time is allowed the print goes on; otherwise the silence stops it."""
+    bench = Bench(allow_soft_realtime=soft, setpoint_watchdog=0.1).opened()
+    late, port = [], bench.wire.port
+
+    def work(now):
+        sent, port.sent = port.sent, []
+        late.append((now + 0.04 * (now > start + 0.5), bench.far.exchange(now, sent)))
+        port.arrived += [frame for when, frames in late if when <= now for frame in frames]
+        late[:] = [entry for entry in late if entry[0] > now]
+
+    start = bench.clock.now()
+    bench.wire.work = work
+    found = None
+    try:
+        stream(iter([run_of(700, seed=5)]), bench.link, bench.user, start=ZERO)
+    except DriveError as error:
+        found = error.problems[0].kind
+    assert found == (None if soft else "feedback-lost")
     bench.close()

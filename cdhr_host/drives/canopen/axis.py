@@ -11,7 +11,8 @@ SLOW: Final = struct.Struct("<HbI")
 
 
 class Axis:
-    """Last feedback and control word of a drive; ``missed`` counts cycles without feedback."""
+    """Last feedback and control word of a drive; ``missed`` counts cycles without feedback,
+    ``jump`` is the greatest movement a cycle."""
 
     def __init__(self, node: int) -> None:
         self.node = node
@@ -26,7 +27,7 @@ class Axis:
         self.missed = 0
         self.unfollowing = 0
         self.misfit: int | None = None
-        self.jump = 0
+        self.jump = 0.0
         self._known = False
 
     @property
@@ -42,7 +43,7 @@ class Axis:
         before = self.position
         self.status, self.position, self.torque = FEEDBACK.unpack(data)
         if self._known:
-            self.jump = max(self.jump, abs(self.position - before))
+            self.jump = max(self.jump, abs(self.position - before) / max(self.missed, 1))
         self._known = True
         self.answers += 1
         self.missed = 0

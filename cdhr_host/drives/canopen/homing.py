@@ -67,7 +67,7 @@ def _home(machine: CanopenMachine, axis: Axis) -> None:
     axis.word = START_HOMING
     deadline = machine.bus.clock.now() + PATIENCE
     while axis.status & DONE != DONE:
-        axis.jump = 0
+        axis.jump = 0.0
         findings = [f for f in machine.listen() if f.problems[0].kind != "encoder-jump"]
         if findings:
             raise findings[0]

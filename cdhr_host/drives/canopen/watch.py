@@ -30,7 +30,7 @@ ENCODER_LOST: Final = (0x7300, 0x7320)
 
 class Watch:
     """Findings of one cycle; ``unreferenced`` gathers axes whose position cannot be trusted,
-    ``codes`` the emergency codes seen."""
+    ``codes`` the emergency codes seen. Answers may be ``stale`` cycles old without a finding."""
 
     def __init__(self, profile: Profile, bus: Bus, axes: list[Axis]) -> None:
         settings = profile.canopen
@@ -42,6 +42,7 @@ class Watch:
         watchdog = 0 if self._strict else round(settings.setpoint_watchdog / profile.drives.period)
         self._unfollowing = max(UNFOLLOWING, watchdog)
         self._patience = max(FEEDBACK_LOST * settings.feedback_every, soft)
+        self.stale = max(settings.feedback_every, soft)
         reach = profile.sliders.speed_max * profile.drives.period * settings.feedback_every
         self._jump = (3.0 * reach + profile.drives.following_error_max) / settings.position_unit
         self._unit = settings.position_unit
@@ -124,7 +125,7 @@ class Watch:
                 "encoder-jump",
                 f"the position of {name} jumped by {axis.jump * self._unit / MM:.3f} mm in a cycle",
             )
-        axis.jump = 0
+        axis.jump = 0.0
 
     def _enabled(self, axis: Axis) -> Iterator[DriveError]:
         name, state = node_name(axis.node), axis.state
