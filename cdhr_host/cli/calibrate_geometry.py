@@ -32,6 +32,8 @@ PLAN = examples(
 )
 FEWEST = 4
 """poses that make a calibration"""
+SUSPICIOUS = 1.0 * MM
+"""noise of a coordinate that no camera and no gauge has"""
 PulleyDoubt = Annotated[
     float, typer.Option(metavar="MM", help="How far off pulley centres may be, one sigma.", min=0, max=50)
 ]
@@ -214,6 +216,11 @@ def _tell(fit: "GeometryFit", table: Path) -> None:
     from cdhr_host.report.studies.told import fit_lines
 
     emit("\n".join([f"{table}: the machine, around {fit.profile.machine.name}", *fit_lines(fit)]))
+    if fit.found.noise > SUSPICIOUS:
+        say(f"doubt: no geometry brings the points nearer than {fit.found.noise / MM:.3g} mm a coordinate")
+        say(
+            "hint: a camera's own frame needs --frame free; sliders are in mm paid out from the reference pose"
+        )
 
 
 def _asked(fit: "GeometryFit") -> Path | None:

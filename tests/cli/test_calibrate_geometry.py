@@ -140,6 +140,19 @@ def test_refusals(
     assert not list(tmp_path.iterdir())
 
 
+def test_points_of_another_frame_are_doubted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = measured(tmp_path, 6)
+    rows = [line.split(",") for line in table.read_text(encoding="utf-8").splitlines()]
+    turned = [rows[0], *([*row[:6], row[7], f"{-float(row[6]) + 300:.3f}", row[8]] for row in rows[1:])]
+    table.write_text("\n".join(",".join(row) for row in turned), encoding="utf-8")
+    run("calibrate", "geometry", str(table))
+    assert "hint: a camera's own frame needs --frame free" in capsys.readouterr().err
+    run("calibrate", "geometry", str(table), "--frame", "free", "--json")
+    record = json.loads(capsys.readouterr().out)
+    assert record["noise_mm"] < 0.1
+    assert "frame turn z" in record["parameters"]
+
+
 def test_a_terminal_is_asked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
