@@ -219,7 +219,7 @@ def _tell(fit: "GeometryFit", table: Path) -> None:
     if fit.found.noise > SUSPICIOUS:
         say(f"doubt: no geometry brings the points nearer than {fit.found.noise / MM:.3g} mm a coordinate")
         say(
-            "hint: a camera's own frame needs --frame free; sliders are in mm paid out from the reference pose"
+            "hint: a camera's own frame needs --frame free; sliders are mm paid out from the reference pose"
         )
 
 
