@@ -12,7 +12,6 @@ from cdhr_host.cli.refusals import INTERRUPTED, emit
 
 if TYPE_CHECKING:
     from cdhr_host.job.printer import Printer
-    from cdhr_host.job.recorder import Names, Recorder
 
 EXAMPLES = examples(
     "cdhr jog",
@@ -32,10 +31,12 @@ def jog(
 ) -> None:
     """Jog: a screen with keys and typed G-code on a terminal; lines of G-code from a pipe.
 
-    From a pipe each line is proven before it moves and answered with ok and the position, or
-    with its refusal; the exit code is that of the first refusal. Ctrl-C stops on the path.
+    On a terminal ? shows the keys, and Ctrl-C holds. From a pipe each line is proven before it
+    moves and answered with ok and the position, or with its refusal; the exit code is that of the
+    first refusal, and Ctrl-C stops on the path.
     """
     from cdhr_host.job.printer import Printer
+    from cdhr_host.job.recorder import Names, Recorder
 
     machine = open_machine(profile, material)
     link, clock = opened(drives, machine, speed)
@@ -52,11 +53,12 @@ def jog(
 
 
 def _screen(printer: "Printer") -> int:
-    """Keys, until the operator quits; always 0: refusals were shown."""
+    """Keys, until the operator quits or the terminal is gone; refusals were shown."""
     from cdhr_host.console.desk import Desk
 
-    Desk(printer).run()
-    return 0
+    with StopRequest() as stop:
+        Desk(printer, should_stop=stop).run()
+    return INTERRUPTED if stop.asked else 0
 
 
 def _lines(printer: "Printer") -> int:

@@ -7,7 +7,7 @@ from typing import ClassVar, Final
 
 from textual import events
 from textual.app import App, ComposeResult
-from textual.binding import BindingType
+from textual.binding import Binding, BindingType
 from textual.containers import Horizontal
 from textual.screen import ModalScreen
 from textual.widgets import Footer, Input, RichLog, Static
@@ -67,10 +67,19 @@ class Desk(App[None]):
         ("exclamation_mark", "emergency", "E-STOP"),
         ("question_mark", "help", "keys"),
         ("q", "leave", "quit"),
+        Binding("ctrl+c", "hold", "hold", show=False, priority=True),
     ]
 
-    def __init__(self, surface: Surface, *, history: Path | None = None) -> None:
+    def __init__(
+        self,
+        surface: Surface,
+        *,
+        history: Path | None = None,
+        should_stop: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Leaves, with the machine at rest, once ``should_stop`` says so."""
         super().__init__()
+        self._should_stop = should_stop
         self._surface = surface
         self._history = History(history or history_file())
         self._jogging = Jogging(surface, self._answered)
@@ -133,6 +142,10 @@ class Desk(App[None]):
         """The space bar."""
         held = self._surface.status().state is JobState.HELD
         self._try(self._surface.resume if held else lambda: self._surface.hold("operator"))
+
+    def action_hold(self) -> None:
+        """Ctrl-C: whatever moves comes to rest on its path."""
+        self._try(lambda: self._surface.hold("operator"))
 
     def action_start(self) -> None:
         """Start the proven file."""
@@ -249,6 +262,9 @@ class Desk(App[None]):
             self.call_later(self.say, event.text)
 
     def _refresh(self) -> None:
+        if self._should_stop():
+            self.exit()
+            return
         status = self._surface.status()
         self._leaving = self._leaving and status.state in MOVING
         shown = {
