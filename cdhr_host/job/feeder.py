@@ -143,7 +143,7 @@ class Feeder:
         made = self.making.revised(score, first)
         room = self.link.free + self.next_tick - first
         made.make(min(max(self.next_tick - first, CHUNK), room))
-        made.look(math.ceil(score.last.pace.settled) + HISTORY + 1)
+        made.look(math.ceil(max(score.last.pace.settled, score.gain.settled)) + HISTORY + 1)
         if len(self._sent) and first < self.next_tick:
             rows = made.ready.take(min(len(made.ready), room))
             self.link.revise(rows)

@@ -68,7 +68,7 @@ class Feeds:
         if flow < self._gain:
             self._push(flow)
         if moving and not self._joined():
-            self._changes.pace(self.rate)
+            self._changes.pace(self.rate, late=self._changes.lead)
         self._push_more()
 
     def turn(self, *, moving: bool) -> None:
@@ -91,8 +91,9 @@ class Feeds:
             self._push(self._flow)
 
     def _push(self, flow: float) -> None:
-        self._gain = flow
-        self._changes.flow(flow)
+        with suppress(MotionError):
+            self._changes.flow(flow)
+            self._gain = flow
 
     def plan_time(self) -> float | None:
         """Ticks of the program as written that are done; None where that is not known."""
@@ -133,10 +134,10 @@ class Feeds:
         if score is None or feeder.standing or self._right():
             return False
         first = feeder.changeable
-        part = score.part_at(first)
+        part, soonest = score.part_at(first), first + round(self._changes.lead / feeder.period)
         with suppress(MotionError):
             other = self._other(part.course, part.pace.start(float(first)).u)
-            return other is not None and any(self._join(other, first + later) for later in LATER)
+            return other is not None and any(self._join(other, soonest + later, first) for later in LATER)
         return False
 
     def _other(self, course: Course, u: float) -> Course | None:
@@ -150,8 +151,8 @@ class Feeds:
         base.plan(math.ceil(there))
         return base.hastened(there, override) if spot(base, there) is not None else None
 
-    def _join(self, other: Course, tick: int) -> bool:
-        """Play the other course from a tick on, if speed and limits allow it."""
+    def _join(self, other: Course, tick: int, first: int) -> bool:
+        """Play the other course from a tick on, if speed and limits allow it; the air knows from ``first`` on."""
         feeder, score = self._feeder, self._feeder.score
         assert score is not None
         part = score.part_at(tick)
@@ -164,7 +165,7 @@ class Feeds:
         shaped = partial(_shaped, start, target)
         for pace in choices(ahead, shaped, tick, abs(target - start.rate), waits=(0.0,)):
             with suppress(CdhrError):
-                feeder.revise(score.with_part(Part(tick, other, pace)), tick)
+                feeder.revise(score.with_part(Part(tick, other, pace)), first)
                 self._changes.wanted = target
                 return True
         return False
