@@ -25,6 +25,36 @@ EXAMPLES = examples(
     "The real Moonraker: --klippy-socket. See docs/serve.md.",
 )
 
+MarlinPath = Annotated[
+    Path | None, typer.Option(metavar="PATH", help="Marlin's line protocol on a pseudo-terminal; its name.")
+]
+TcpPort = Annotated[
+    int | None,
+    typer.Option(metavar="PORT", help="The same on a TCP port of this machine only.", min=0, max=65535),
+]
+HttpPort = Annotated[
+    int, typer.Option(metavar="PORT", help="Uploads, Moonraker's API and the page.", min=0, max=65535)
+]
+NoHttp = Annotated[bool, typer.Option("--no-http", help="No HTTP port.")]
+KlippyPath = Annotated[
+    Path | None, typer.Option(metavar="PATH", help="Klipper's unix socket, for the real Moonraker.")
+]
+Bind = Annotated[
+    str,
+    typer.Option(metavar="ADDRESS", help="Where the HTTP port listens; beyond loopback a key is asked for."),
+]
+Files = Annotated[
+    Path | None, typer.Option(metavar="DIR", help="The upload folder (default: in your data folder).")
+]
+Names = Annotated[
+    list[str] | None, typer.Option(metavar="HOST", help="A name by which clients call this machine.")
+]
+Origins = Annotated[
+    list[str] | None, typer.Option(metavar="URL", help="Another page that may speak to the HTTP port.")
+]
+KeyFile = Annotated[Path | None, typer.Option(metavar="FILE", help="Where the API key's hash is kept.")]
+NewKey = Annotated[bool, typer.Option("--new-key", help="Make a new API key; the old one ends.")]
+
 
 def serve(
     *,
@@ -34,40 +64,17 @@ def serve(
     speed: Annotated[
         float, typer.Option(metavar="X", help="Run the simulated drives X times faster.", min=0.01)
     ] = 1.0,
-    marlin: Annotated[
-        Path | None,
-        typer.Option(metavar="PATH", help="Marlin's line protocol on a pseudo-terminal; its name."),
-    ] = None,
-    tcp: Annotated[
-        int | None,
-        typer.Option(metavar="PORT", help="The same on a TCP port of this machine only.", min=0, max=65535),
-    ] = None,
-    http: Annotated[
-        int, typer.Option(metavar="PORT", help="Uploads, Moonraker's API and the page.", min=0, max=65535)
-    ] = 7125,
-    no_http: Annotated[bool, typer.Option("--no-http", help="No HTTP port.")] = False,
-    klippy_socket: Annotated[
-        Path | None, typer.Option(metavar="PATH", help="Klipper's unix socket, for the real Moonraker.")
-    ] = None,
-    bind: Annotated[
-        str,
-        typer.Option(
-            metavar="ADDRESS", help="Where the HTTP port listens; beyond loopback a key is asked for."
-        ),
-    ] = "127.0.0.1",
-    files: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="The upload folder (default: in your data folder).")
-    ] = None,
-    name: Annotated[
-        list[str] | None, typer.Option(metavar="HOST", help="A name by which clients call this machine.")
-    ] = None,
-    origin: Annotated[
-        list[str] | None, typer.Option(metavar="URL", help="Another page that may speak to the HTTP port.")
-    ] = None,
-    key_file: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Where the API key's hash is kept.")
-    ] = None,
-    new_key: Annotated[bool, typer.Option("--new-key", help="Make a new API key; the old one ends.")] = False,
+    marlin: MarlinPath = None,
+    tcp: TcpPort = None,
+    http: HttpPort = 7125,
+    no_http: NoHttp = False,
+    klippy_socket: KlippyPath = None,
+    bind: Bind = "127.0.0.1",
+    files: Files = None,
+    name: Names = None,
+    origin: Origins = None,
+    key_file: KeyFile = None,
+    new_key: NewKey = False,
     json_: Json = False,
 ) -> None:
     """Serve OctoPrint, slicers, Mainsail, Fluidd, Moonraker and browsers until interrupted.

@@ -13,13 +13,14 @@ from typing import Final
 
 from cdhr_host.errors import CdhrError, MotionError, Problem
 from cdhr_host.job.surface import Progress
+from cdhr_host.motion.hold import rows_needed
 from cdhr_host.pipeline import Staircase
 from cdhr_host.pipeline.arriving import Arriving
 from cdhr_host.pipeline.foreseen import Foresight
 from cdhr_host.values import Command, Moves
 
 AHEAD: Final = 3.0
-"""s of real time planned ahead; a client that pauses is obeyed that late"""
+"""s of real time drawn ahead; a client that pauses is obeyed that late"""
 WAITING_MAX: Final = 256
 """short lines not read yet while the plan needs more"""
 WAITING_FULL: Final = 8
@@ -29,7 +30,7 @@ TOGETHER: Final = 256
 EVERY: Final = 0.05
 """s of real time between two readings of short lines, and"""
 SETTLED: Final = 1.0
-"""s of real time settled ahead; the plan is settled further only below that"""
+"""s of real time settled beyond the far side's reserve; the plan is settled further only below that"""
 SHORT: Final = 0.1
 """s a line lasts that counts as short"""
 PATIENCE: Final = 0.1
@@ -63,13 +64,15 @@ class LineStream:
         """of the line that the print stands before"""
         self.blocked = False
         """whether what is planned cannot be moved: nothing but an end is possible"""
+        self.full = False
+        """whether no more is read although what is settled is not enough to play on"""
         self._machine = machine
         self._foresight = Foresight(machine)
         self._tell, self._now = tell, now
         self._ahead = AHEAD * speed / machine.period
         self._lock = threading.Lock()
         self._waiting: deque[Waiting] = deque()
-        self._settled = SETTLED * speed / machine.period
+        self._settled = rows_needed(machine.profile) + SETTLED * speed / machine.period
         self._settled_to = 0.0
         self._next = self.began
         self._room = WAITING_FULL
@@ -83,11 +86,11 @@ class LineStream:
     def offer(self, line: str, *, typed: bool = False) -> bool:
         """Take one line of G-code; False while there is no room. From any thread."""
         with self._lock:
+            self._heard = self._now()
             if self._finished or len(self._waiting) >= self._room:
                 return False
             self._waiting.append(Waiting(" ".join(line.split("\n")), typed))
             self._offered += 1
-            self._heard = self._now()
         return True
 
     @property
@@ -111,7 +114,9 @@ class LineStream:
 
     @property
     def patient(self) -> bool:
-        """Whether further lines may still come in time."""
+        """Whether further lines are there, or may still come in time."""
+        if self._waiting and self.refusal is None:
+            return True
         return not self._finished and self._now() - self._heard < PATIENCE
 
     def read(self, played: float) -> None:
@@ -124,6 +129,7 @@ class LineStream:
         self._room = WAITING_MAX if hungry and self._together > 1 else WAITING_FULL
         if self.course.staircase.tick - played < self._settled and not self.course.rests:
             self._settle()
+        self.full = not hungry and self.course.staircase.tick - played < self._settled
 
     def _read_until(self, tick: float) -> None:
         while self.refusal is None and self._waiting and self.course.ahead < tick:

@@ -90,7 +90,7 @@ class Lines:
             if not stream.look():
                 self._blocked(stream)
                 return
-        course.hurried = not stream.patient or self._runs_low()
+        course.hurried = not stream.patient or stream.full or self._runs_low()
         if not player.busy and state in MOVES:
             self._begin(stream)
         stream.executed(self._line(), at_rest=self._all_executed(stream))
@@ -104,7 +104,7 @@ class Lines:
         if beyond > 0 and (beyond >= self._lead or not stream.patient):
             player.go_on()
         elif not stream.course.rests and not stream.patient:
-            stream.course.plan(stream.course.staircase.tick + 1)
+            stream.course.rest()
         elif stream.drained:
             if stream.over or stream.refusal is not None:
                 self._ended(stream)
@@ -117,7 +117,7 @@ class Lines:
         if planned > 0 and (planned >= self._lead or course.hurried):
             self._player.lines(course)
         elif not course.rests and course.hurried:
-            course.plan(course.staircase.tick + 1)
+            course.rest()
         elif course.rests and (stream.over or stream.refusal is not None):
             self._ended(stream)
 

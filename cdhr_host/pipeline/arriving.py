@@ -25,12 +25,6 @@ class ArrivingTape(Tape):
     def __init__(self) -> None:
         super().__init__(iter(()))
 
-    def room(self, u: float) -> int:
-        """Ticks that are planned beyond a time of the plan; unbounded up to rest, and when ``hurried``."""
-        if self.stop() is not None or (self.hurried and not self.rests):
-            return UNBOUNDED
-        return max(math.floor(self.staircase.tick - u) - MARGIN, 0)
-
     def add(self, commands: Sequence[Command]) -> None:
         """Further commands."""
         self._kept.extend(commands)
@@ -52,6 +46,12 @@ class Arriving(Course):
         """Whether all that has come is planned and ends at rest."""
         return self._rests and self._arrived.at(self._at) is None
 
+    def room(self, u: float) -> int:
+        """Ticks that are planned beyond a time of the plan; unbounded up to rest, and when ``hurried``."""
+        if self.stop() is not None or (self.hurried and not self.rests):
+            return UNBOUNDED
+        return max(math.floor(self.staircase.tick - u) - MARGIN, 0)
+
     def add(self, commands: Sequence[Command]) -> None:
         """Further commands."""
         self._arrived.add(commands)
@@ -67,15 +67,23 @@ class Arriving(Course):
         return self.staircase.tick + self.staircase.drawn / self.staircase.period
 
     def plan(self, until: int) -> None:
-        """Plan on up to a tick; where commands run out before it, up to rest."""
+        """Plan on up to a tick, no further than the next stop; where commands run out, up to rest."""
+        if self.stops:
+            until = min(until, self.stops[0].tick - 1)
         self._draw()
         if not self._rests and self.staircase.tick <= until:
             self.advance()
         if not self._rests and self.staircase.tick <= until:
+            self.rest()
+        self._arrived.forget(min(self._at, self.oldest))
+
+    def rest(self) -> None:
+        """Plan all commands so far, up to rest."""
+        self._draw()
+        if not self._rests:
             self._placing(self._place(self.staircase.closed(ends=False)))
             self.stops.append(Stop(self.staircase.tick, None, waits=True))
             self._rests = True
-        self._arrived.forget(min(self._at, self.oldest))
 
     def _draw(self) -> None:
         while (command := self._arrived.at(self._at)) is not None:

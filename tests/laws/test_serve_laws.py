@@ -21,7 +21,7 @@ from cdhr_host.serve.words import Modes, code_of, number_after
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "serve"))
 from doors import Open, with_doors
-from test_marlin import Client, checked, with_client
+from marlin_client import Client, checked, with_client
 
 MANY = settings(
     max_examples=1000,

@@ -86,3 +86,14 @@ def test_memory_stays_flat_in_the_lines() -> None:
     assert len(list(course.placed())) < 20
     assert len(course._marks) < 20
     assert len(course._arrived._kept) < 20
+
+
+def test_a_bead_settles_while_it_is_drawn() -> None:
+    machine = Staircase(PROFILE)
+    course = Arriving(machine.fork())
+    for line in RING.splitlines(keepends=True):
+        course.add(list(machine.commands([line.encode()])))
+        course.advance()
+    drawn = 126e-3 / 20e-3 / PROFILE.drives.period
+    assert course.staircase.tick > 0.7 * drawn
+    assert course.stop() is None
