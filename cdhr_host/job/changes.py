@@ -45,6 +45,14 @@ class Changes:
         self.wanted = 1.0
         self._late = 0.0
 
+    @property
+    def lead(self) -> float:
+        """s until the air can follow a change, where the profile waits for that."""
+        score = self._feeder.score
+        if score is None or self._feeder.link.profile.job.hold != "clean":
+            return 0.0
+        return score.staircase.rig.air.change_lead
+
     def begin(self, rate: float) -> None:
         """A course is begun at this rate."""
         self.wanted = rate
@@ -60,7 +68,7 @@ class Changes:
         if score is None or self._feeder.standing or not self._feeder.settled:
             return
         if abs(score.last.pace.target - self.wanted) > SAME:
-            self._late = 0.0
+            self._late = self.lead
             self._retried(self._paced)
 
     def go_on(self, rate: float, *, prime: float = 0.0) -> None:
@@ -110,7 +118,8 @@ class Changes:
             feeder.making.score = replace(score, gain=Gain(share, share))
             return
         now = float(score.gain.at(np.array([first]))[0])
-        gain = Gain(now, share, first, max(1, round(FLOW_TIME / feeder.period)))
+        begin = first + round(self.lead / feeder.period)
+        gain = Gain(now, share, begin, max(1, round(FLOW_TIME / feeder.period)))
         feeder.revise(replace(score, gain=gain), first)
 
     def _paced(self, first: int) -> None:

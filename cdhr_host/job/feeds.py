@@ -152,7 +152,7 @@ class Feeds:
         return base.hastened(there, override) if spot(base, there) is not None else None
 
     def _join(self, other: Course, tick: int, first: int) -> bool:
-        """Play the other course from a tick on, if speed and limits allow it; the air knows from ``first`` on."""
+        """Play the other course from a tick on, if limits allow it; the air knows of it from ``first`` on."""
         feeder, score = self._feeder, self._feeder.score
         assert score is not None
         part = score.part_at(tick)
