@@ -131,7 +131,7 @@ class Acts:
         self._count = Count(program, self._clock.now(), line=recovery.line)
         self._count.plan = recovery.tick * self.player.profile.drives.period
         self.player.recover(Resuming(program, self.player.staircase.rig).aside(recovery.tick))
-        self.records.begin(program.file, goes_on=goes_on)
+        self.records.begin(program.file, goes_on=goes_on, tick=recovery.tick)
 
     def open(self, name: str) -> LineStream:
         """Print what a client sends."""

@@ -63,8 +63,8 @@ class Recorder:
         """The journal that is being written."""
         return None if self._journal is None else self._journal.path
 
-    def begin(self, file: ProgramFile, *, goes_on: str = "", extruded: float = 0.0) -> None:
-        """A print begins, m³ after its beginning. Raises JobError where no journal can be written."""
+    def begin(self, file: ProgramFile, *, goes_on: str = "", tick: float = 0.0) -> None:
+        """A print begins, at a tick of its plan. Raises JobError where no journal can be written."""
         self.end()
         prune(self._folder)
         now = datetime.now(UTC)
@@ -80,10 +80,11 @@ class Recorder:
             period_s=self._link.profile.drives.period,
             begun=now.isoformat(timespec="seconds"),
             goes_on=goes_on,
+            first_tick=tick,
         )
         self._journal = JournalWriter(self._folder / f"{stem}{JOURNAL}", opened)
         self._dogs = Watchdogs(self._link.profile)
-        self._file, self._extruded = file, extruded
+        self._file, self._extruded = file, 0.0
 
     def executed(self, rows: Setpoints, feedback: Feedback, plan: Plan | None) -> Alarm | None:
         """A batch that was executed, with a ``plan`` while a program is played; the first thing wrong."""

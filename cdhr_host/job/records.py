@@ -25,10 +25,10 @@ class Records:
             player.observers.append(self._executed)
             telling.listen(self._heard)
 
-    def begin(self, file: ProgramFile, *, goes_on: str = "") -> None:
+    def begin(self, file: ProgramFile, *, goes_on: str = "", tick: float = 0.0) -> None:
         """A print begins. Raises JobError where no journal can be written."""
         if self._recorder is not None:
-            self._recorder.begin(file, goes_on=goes_on)
+            self._recorder.begin(file, goes_on=goes_on, tick=tick)
 
     def alarm(self, now: float) -> Alarm | None:
         """What a watchdog has found since the last call."""
@@ -68,7 +68,8 @@ class Records:
     def _plan(self) -> Plan | None:
         """Where in the program the machine is, and how far what the link may hold could bring it."""
         player = self._player
-        if player.kind is not Kind.PROGRAM or (now := player.feeds.plan_time()) is None:
+        stopped = player.link.stop_tick is not None  # what a link plays then is not the plan's
+        if stopped or player.kind is not Kind.PROGRAM or (now := player.feeds.plan_time()) is None:
             return None
         held = player.link.free + player.feeder.buffered
         return Plan(now, now + held * max(player.feed, 1.0))

@@ -74,12 +74,16 @@ class Resuming:
 
         Raises JobError where the journal is not of this plan, or the nozzle not near its path.
         """
+        if journal.executed is None:
+            return self._not_begun(journal)
         last, fed, course = self._known(journal)
         bead, rested, away, sure = self._rest(course, journal.state, (last, fed), measured_G, stops)
         return self._going_on(course, (bead, rested), overlap, away=away, sure=sure)
 
     def moved(self, journal: Journal, overlap: float) -> Recovery:
         """From a journal alone, where the machine was moved since: the bead ended there, or later."""
+        if journal.executed is None:
+            return self._not_begun(journal)
         last, fed, course = self._known(journal)
         rested = last.plan_tick if journal.state == "held" else fed
         return self._going_on(course, (last.plan_tick, rested), overlap, sure=rested == last.plan_tick)
@@ -93,7 +97,7 @@ class Resuming:
                     f"no motion at line {line} or after it", f"{self._program.file.name} ends before"
                 )
             course.skip(course.staircase.tick + 1)
-        return Recovery(tick, self._line(course, tick), self._place(course, tick), tick, tick, 0.0, 0.0, True)
+        return self._at(course, tick)
 
     def length(self, first: float, last: float) -> float:
         """m of path between two ticks of the plan."""
@@ -121,11 +125,21 @@ class Resuming:
         course.plan(math.ceil(tick) + 1)
         return course
 
+    def _not_begun(self, journal: Journal) -> Recovery:
+        """A print that was on its way to where it should have gone on; what it moved was no clay."""
+        tick = journal.opened.first_tick
+        if tick <= 0.0:
+            raise _refusal("nothing of this print was executed", "cdhr stream FILE begins it anew")
+        return self._at(self._course(tick), tick)
+
+    def _at(self, course: Course, tick: float) -> Recovery:
+        """Exactly there."""
+        return Recovery(tick, self._line(course, tick), self._place(course, tick), tick, tick, 0.0, 0.0, True)
+
     def _known(self, journal: Journal) -> tuple[Executed, float, Course]:
         """What was executed last, the tick that the drives may have got to, and the plan around them."""
         last = journal.executed
-        if last is None:
-            raise _refusal("nothing of this print was executed", "cdhr stream FILE begins it anew")
+        assert last is not None
         fed = max(journal.fed.plan_tick if journal.fed else last.plan_tick, last.plan_tick)
         course = self._course(max(last.plan_tick - BACK / self._period, 0.0))
         course.plan(math.ceil(fed) + 1)

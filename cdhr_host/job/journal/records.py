@@ -36,6 +36,8 @@ class Opened:
     """wall time, ISO 8601"""
     goes_on: str
     """the journal this print goes on from; empty for a fresh one"""
+    first_tick: float
+    """of the program's plan at 100 %, at which it goes on; 0 for a fresh one"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +65,7 @@ class Executed:
     air: bool
     """whether clay was being pushed"""
     extruded_mm3: float
-    """as planned, since the program's start"""
+    """as planned, since this journal begins"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,7 +24,17 @@ from cdhr_host.job.journal import (
 from cdhr_host.job.journal.records import decoded, encoded
 
 OPENED = Opened(
-    1, "/tmp/väse.gcode", "ab" * 32, "paper", None, "cd" * 32, "loopback:", 0.004, "2026-11-22T06:00:00", ""
+    1,
+    "/tmp/väse.gcode",
+    "ab" * 32,
+    "paper",
+    None,
+    "cd" * 32,
+    "loopback:",
+    0.004,
+    "2026-11-22T06:00:00",
+    "",
+    0.0,
 )
 
 
