@@ -231,7 +231,7 @@ class Setpoints(_Frozen):
     def __len__(self) -> int:
         return len(self.tick)
 
-    def __getitem__(self, rows: slice | Flags) -> "Setpoints":
+    def __getitem__(self, rows: slice | Flags | Ints) -> "Setpoints":
         return Setpoints(*(getattr(self, field.name)[rows] for field in fields(self)))
 
 

@@ -23,6 +23,7 @@ from cdhr_host.job.player import Observer, Player
 from cdhr_host.job.program import Program, ProgramFile, proven
 from cdhr_host.job.recorder import Recorder
 from cdhr_host.job.recovery import Recovery
+from cdhr_host.job.sliding import Sliding, check_step
 from cdhr_host.job.states import QUIET, Word, after
 from cdhr_host.job.surface import JobState, LineFeed, Listener, Reply, Status
 from cdhr_host.job.telling import Telling
@@ -65,6 +66,7 @@ class Printer:
         self._acts = Acts(Player(link), clock, self._telling, self._happened, recorder)
         self._typed = Typed(self._acts.player)
         self._jogging = Jogging(self._acts.player, clock, self._limit_met)
+        self._sliding = Sliding(self._acts.player, partial(self._telling.add, "message"))
 
     @property
     def profile(self) -> Profile:
@@ -187,6 +189,12 @@ class Printer:
         way = np.array(distance, dtype=float)
         return self._later(lambda: self._acts.player.step(way))
 
+    def step_slider(self, axis: int, distance: float) -> "Future[Reply]":
+        """One slider alone, the others held; refused unless every tick of it is safe."""
+        check_step(axis, distance)
+        self._check_still()
+        return self._later(lambda: self._slid(axis, distance))
+
     def jog(self, velocity: Array) -> None:
         """Go on so for a lease."""
         speed = np.array(velocity, dtype=float)
@@ -217,6 +225,8 @@ class Printer:
             while self._asked:
                 self._asked.popleft()()
             self._acts.turn(self._state)
+            if (found := self._sliding.alarm()) is not None:
+                self._typed.end(found)
             self._typed.turn(self._state)
             self._jogging.turn(self._state)
         except CdhrError as error:
@@ -227,6 +237,16 @@ class Printer:
     def moving(self) -> bool:
         """Whether anything is being played or asked for."""
         return bool(self._asked) or self._acts.busy or self._typed.busy or self._jogging.busy
+
+    def _check_still(self) -> None:
+        """Raises JobError while there is a job: the pose must not be left under one."""
+        if self._state not in {JobState.IDLE, JobState.STOPPED}:
+            message = f"no single slider is moved while the printer is {self._state.value}"
+            raise JobError(Problem("state", message, hint="unload the program, or abort it, first"))
+
+    def _slid(self, axis: int, distance: float) -> bool:
+        self._check_still()
+        return self._sliding.begin(axis, distance)
 
     def _limit_met(self, limit: Problem) -> None:
         self._telling.add("message", f"the jog ends here: {limit.message}", limit)

@@ -9,7 +9,7 @@ which such a stop ends where the nozzle stands.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -77,7 +77,7 @@ class Resuming:
         if journal.executed is None:
             return self._not_begun(journal)
         last, fed, course = self._known(journal)
-        bead, rested, away, sure = self._rest(course, journal.state, (last, fed), measured_G, stops)
+        bead, rested, away, sure = self._rest(course, journal, (last, fed), measured_G, stops)
         return self._going_on(course, (bead, rested), overlap, away=away, sure=sure)
 
     def moved(self, journal: Journal, overlap: float) -> Recovery:
@@ -169,33 +169,37 @@ class Resuming:
             )
 
     def _rest(
-        self, course: Course, state: str, known: tuple[Executed, float], measured_G: Array, stops: Stops
+        self, course: Course, journal: Journal, known: tuple[Executed, float], measured_G: Array, stops: Stops
     ) -> tuple[float, float, float, bool]:
         """Ticks at which the bead ended and the nozzle rests, m from the path, and whether that is sure."""
         last, fed = known
-        rows = self._rows(course, last.plan_tick, fed)
+        tick, rows = self._rows(course, last.plan_tick, fed, journal.pace)
         away = np.linalg.norm(rows.nozzle_G - measured_G, axis=1)
         nearest = int(away.argmin())
-        distance, first = float(away[nearest]), int(rows.tick[0])
-        rested = max(float(first + nearest), last.plan_tick)
+        distance, rested = float(away[nearest]), max(float(tick[nearest]), last.plan_tick)
         if distance > NEAR:
             raise _refusal(
                 f"the nozzle stands {distance / MM:.2f} mm from the path it was on (limit {NEAR / MM:g} mm)",
                 "if it was moved since, say --moved; if not, reference the machine",
             )
-        if state == "held":
+        if journal.state == "held":
             return last.plan_tick, last.plan_tick, distance, True
         begin = _stop_begin(rows, nearest, stops)
         if begin is None:
             return last.plan_tick, rested, distance, False
-        return max(float(first + begin), last.plan_tick), rested, distance, True
+        return max(float(tick[begin]), last.plan_tick), rested, distance, True
 
-    def _rows(self, course: Course, first: float, last: float) -> Setpoints:
-        """The plan's rows over what may have been executed, and what a stop may still have played."""
-        end = math.ceil(last) + rows_needed(self._rig.profile)
+    def _rows(self, course: Course, first: float, last: float, pace: float) -> tuple[Array, Setpoints]:
+        """(N,) ticks of the plan as they were played at a pace, and the rows at them.
+
+        Over what may have been executed, and what a stop may still have played.
+        """
+        end = math.ceil(last + rows_needed(self._rig.profile) * max(pace, 1.0))
         course.plan(end + 1)
         stop = course.stop()
-        return course.rows(math.floor(first), end if stop is None else min(end, stop.tick))
+        rows = course.rows(math.floor(first), end if stop is None else min(end, stop.tick))
+        tick = np.arange(float(rows.tick[0]), float(rows.tick[-1]), pace)
+        return tick, _between(rows, tick)
 
     def _before(self, course: Course, tick: float, way: float) -> float:
         """The tick this much path before another; that of the last rest at the most."""
@@ -218,6 +222,18 @@ class Resuming:
 
     def _line(self, course: Course, tick: float) -> int:
         return int(course.nozzle(np.array([tick])).line[0])
+
+
+def _between(rows: Setpoints, tick: Array) -> Setpoints:
+    """Rows at (N,) ticks that need not be whole, on the straight between two."""
+    below = np.floor(tick).astype(np.int64) - int(rows.tick[0])
+    share = (tick - np.floor(tick))[:, None]
+    low, high = rows[below], rows[np.minimum(below + 1, len(rows) - 1)]
+    return replace(
+        low,
+        nozzle_G=low.nozzle_G + share * (high.nozzle_G - low.nozzle_G),
+        slider=low.slider + share * (high.slider - low.slider),
+    )
 
 
 def _stop_begin(rows: Setpoints, rested: int, stops: Stops) -> int | None:

@@ -251,6 +251,15 @@ class Surface(Protocol):
         """(3,) m: one straight move from where the nozzle stands; as ``run``, modes stay as they are."""
         ...
 
+    def step_slider(self, axis: int, distance: float) -> "Future[Reply]":
+        """Slider ``axis`` (0 ... 5) alone by m, up to 1 mm, positive pays out; IDLE and STOPPED only.
+
+        Slow, from rest to rest, the other five held: the nozzle goes where that takes it. Refused
+        where it would leave the bed, a force window, travel or every pose; ended on its way when
+        measured forces or torques say so. Raises JobError for another axis, distance or state.
+        """
+        ...
+
     def jog(self, velocity: Array) -> None:
         """(3,) m/s of the nozzle: go on so for a lease of 150 ms; zero ends it; renewed by calling again.
 

@@ -3,8 +3,9 @@
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import replace
 
-from cdhr_host.errors import CdhrError, Problem
+from cdhr_host.errors import CdhrError, MotionError, Problem
 from cdhr_host.job.player import Kind, Player
 from cdhr_host.job.states import QUIET
 from cdhr_host.job.surface import JobState, Reply
@@ -19,6 +20,7 @@ class Typed:
         self._waiting: deque[tuple[Callable[[], bool], Future[Reply]]] = deque()
         self._running: Future[Reply] | None = None
         self._ended = False
+        self._why: Problem | None = None
 
     @property
     def busy(self) -> bool:
@@ -29,12 +31,12 @@ class Typed:
         """Something for later: ``begin`` proves it and says whether anything moves, or raises."""
         self._waiting.append((begin, answer))
 
-    def end(self) -> None:
-        """Come to rest on the path, and forget what waits."""
+    def end(self, why: Problem | None = None) -> None:
+        """Come to rest on the path, and forget what waits; ``why`` goes into the answer."""
         while self._waiting:
             self._waiting.popleft()[1].set_result(Reply(False, ("stopped before it began",)))
-        if self._running is not None:
-            self._ended = True
+        if self._running is not None and not self._ended:
+            self._ended, self._why = True, why
             self._player.hold()
 
     def turn(self, state: JobState) -> None:
@@ -59,7 +61,7 @@ class Typed:
             return
         try:
             if begin():
-                self._running, self._ended = answer, False
+                self._running, self._ended, self._why = answer, False, None
             else:
                 answer.set_result(self._reply())
         except CdhrError as error:
@@ -73,7 +75,13 @@ class Typed:
     def _reply(self) -> Reply:
         x, y, z = (self._player.staircase.standing_G / MM + 0.0).tolist()
         text = f"X:{x:.3f} Y:{y:.3f} Z:{z:.3f}"
-        return Reply(not self._ended, (f"stopped on the path: {text}" if self._ended else text,))
+        if not self._ended:
+            return Reply(True, (text,))
+        stopped = f"stopped on the path: {text}"
+        if self._why is None:
+            return Reply(False, (stopped,))
+        why = refused(MotionError(self._why))
+        return replace(why, lines=(stopped, *why.lines))
 
 
 def refused(error: CdhrError) -> Reply:

@@ -32,6 +32,8 @@ class Journal:
     """the furthest; None when nothing was fed"""
     bead: Executed | None
     """the last with clay being pushed"""
+    pace: float
+    """ticks of the plan in one of the drives', lately"""
     state: str
     """the last told"""
     reason: str
@@ -71,6 +73,7 @@ class _Reader:
         self._opened: Opened | None = None
         self._executed: Executed | None = None
         self._bead: Executed | None = None
+        self._pace = 1.0
         self._fed: Fed | None = None
         self._turned = Turned("printing", "")
 
@@ -93,6 +96,7 @@ class _Reader:
             case Opened():
                 self._opened = record
             case Executed():
+                self._pace = _pace(self._executed, record, self._pace)
                 self._executed = record
                 self._bead = record if record.air else self._bead
             case Fed():
@@ -118,7 +122,15 @@ class _Reader:
             self._executed,
             self._fed,
             self._bead,
+            self._pace,
             self._turned.state,
             self._turned.reason,
             damage,
         )
+
+
+def _pace(before: Executed | None, now: Executed, known: float) -> float:
+    """From the record before; what is ``known`` where the drives' ticks began anew."""
+    if before is None or now.tick <= before.tick or now.plan_tick <= before.plan_tick:
+        return known
+    return (now.plan_tick - before.plan_tick) / (now.tick - before.tick)
