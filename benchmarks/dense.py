@@ -5,7 +5,10 @@ s''' of the step between each two. Steps of constant s''' tie them together exac
 from rest is no singularity. At both ends of every step the nozzle obeys, with q(s) the run's
 curve,
 
-    |q'| s' <= F,   |q'' s'² + q' s''| <= A,   |q''' s'³ + 3 q'' s' s'' + q' s'''| <= J,
+    |q'| s' <= F,   |q'' s'² + q' s''| <= A,   |q''' s'³ + 3 q'' s' s'' + q' s'''| <= J.
+
+Where q'' jumps along the path, as beside corners that are braked into, s'' jumps with it, so that
+the acceleration is continuous
 
 and the sum of the durations is least. What comes out is sampled as a motion in time and held to
 the limits by finite differences; time is then stretched by what is missing, so that the
@@ -38,6 +41,8 @@ SAMPLE_S = 2e-4
 """s, spacing of the finite differences"""
 SLOWER = (1.0, 1.3)
 """Time scales of the plan from which the optimisation starts"""
+JUMP = 1e-3
+"""1/m, less is rounding"""
 UNIT_TIME = 0.01
 """s, the unit of durations inside the optimisation"""
 
@@ -91,7 +96,8 @@ def _solved(run: Run, limits: MotionLimits, s: Array, slower: float) -> Referenc
     x = np.array(answer["x"]).ravel()
     rate, change, jerk = x[:n] * limits.speed, x[n : 2 * n] * limits.acceleration, x[2 * n : 3 * n - 1]
     step = x[3 * n - 1 :] * UNIT_TIME
-    stretched = _excess(run, limits, (rate[0], change[0], jerk * limits.jerk), step)
+    jump = (_jumps(run, s) * rate**2)[1:]
+    stretched = _excess(run, limits, (rate[0], change[0], jerk * limits.jerk, jump), step)
     t = stretched * np.concatenate(([0.0], np.cumsum(step)))
     return Reference(float(t[-1]), stretched, s, t, bool(solver.stats()["success"]))
 
@@ -109,14 +115,22 @@ _OPTIONS = {
 }
 
 
+def _jumps(run: Run, s: Array) -> Array:
+    """(N,) 1/m: by how many times s'² s'' must jump at each node, for q'' jumps there."""
+    (_, slope, bend, _), (_, _, before, _) = run.at(s), run.at(s, before=True)
+    along = ((before - bend) * slope).sum(axis=1) / np.maximum((slope**2).sum(axis=1), 1e-12)
+    return np.where(np.abs(along) > JUMP, along, 0.0)
+
+
 def _guess(run: Run, limits: MotionLimits, s: Array, slower: float) -> Array:
     """The unknowns as the plan has them, in the optimisation's units."""
     t = np.arange(0.0, run.planned, SAMPLE_S / 4)
     where, rate, change = run.plan_at(t)
     when = np.interp(s, np.maximum.accumulate(where), t)
-    rate, change = np.interp(when, t, rate) / slower, np.interp(when, t, change) / slower**2
+    rate, change = np.interp(when, t, rate) / slower, np.interp(when + SAMPLE_S / 4, t, change) / slower**2
     step = np.maximum(np.diff(when), 1e-5) * slower
-    jerk = np.clip(np.diff(change) / step / limits.jerk, -1.0, 1.0)
+    jumped = np.diff(change) - (_jumps(run, s) * rate**2)[1:]
+    jerk = np.clip(jumped / step / limits.jerk, -1.0, 1.0)
     scaled = rate / limits.speed, change / limits.acceleration, jerk, step / UNIT_TIME
     return np.concatenate(scaled)
 
@@ -137,9 +151,10 @@ class _Problem:
         unknown = casadi.SX.sym("x", 4 * n - 2)
         rate, change = unknown[:n] * limits.speed, unknown[n : 2 * n] * limits.acceleration
         jerk, step = unknown[2 * n : 3 * n - 1] * limits.jerk, unknown[3 * n - 1 :] * UNIT_TIME
-        ties = _ties(limits, np.diff(s), (rate, change, jerk), step)
+        arriving = change - casadi.DM(_jumps(run, s)) * rate**2
+        ties = _ties(limits, np.diff(s), (rate, change, arriving, jerk), step)
         between = rate[:-1] + step * (change[:-1] / 2 + step * jerk / 8)
-        kept = _kept(run, limits, s, (rate, between, change, jerk))
+        kept = _kept(run, limits, s, (rate, between, (change, arriving), jerk))
         nlp = {"x": unknown, "f": casadi.sum1(step), "g": casadi.vertcat(ties, kept)}
         zeros, ones = np.zeros(ties.shape[0]), np.ones(kept.shape[0])
         lower, upper = _bounds(run, s)
@@ -160,13 +175,16 @@ def _bounds(run: Run, s: Array) -> tuple[Array, Array]:
     return lower, upper
 
 
-def _ties(limits: MotionLimits, ds: Array, motion: tuple[Any, Any, Any], step: Any) -> Any:
-    """What constant s''' means for the nodes on either side of each step; 0 when kept."""
-    rate, change, jerk = motion
+def _ties(limits: MotionLimits, ds: Array, motion: tuple[Any, Any, Any, Any], step: Any) -> Any:
+    """What constant s''' means for the nodes on either side of each step; 0 when kept.
+
+    ``motion`` is s' at the nodes, s'' after and before them, and jerk.
+    """
+    rate, change, arriving, jerk = motion
     v, a = rate[:-1], change[:-1]
     moved = step * (v + step * (a / 2 + step * jerk / 6)) - ds
     faster = v + step * (a + step * jerk / 2) - rate[1:]
-    harder = a + step * jerk - change[1:]
+    harder = a + step * jerk - arriving[1:]
     scale = limits.speed * UNIT_TIME
     return casadi.vertcat(moved / scale, faster / limits.speed, harder / limits.acceleration)
 
@@ -174,22 +192,23 @@ def _ties(limits: MotionLimits, ds: Array, motion: tuple[Any, Any, Any], step: A
 def _kept(run: Run, limits: MotionLimits, s: Array, motion: tuple[Any, Any, Any, Any]) -> Any:
     """Squared speed, acceleration and jerk at both ends of each step, as shares of the limits.
 
-    ``motion`` is s' at the nodes, s' half-way in time between them, s'' and jerk.
+    ``motion`` is s' at the nodes, s' half-way in time between them, s'' after and before them, and jerk.
     """
-    rate, between, change, jerk = motion
+    rate, between, (change, arriving), jerk = motion
     middle = (s[1:] + s[:-1]) / 2
     piece = np.clip(np.searchsorted(run.s, middle, side="right") - 1, 0, len(run.feed) - 1)
     third, feed = run.curve[3, piece], run.feed[piece]
     _, slope, bend, _ = run.at(s)
+    ends = (slice(0, -1), bend, change), (slice(1, None), run.at(s, before=True)[2], arriving)
     fast = (slope**2).sum(axis=1)
     shares = [
         _squared([slope, bend], [change, rate**2]) / limits.acceleration**2,
         np.minimum(fast[1:], fast[:-1]) * between**2 / feed**2,
     ]
-    for end in (slice(0, -1), slice(1, None)):
+    for end, bends, changes in ends:
         shares.append(fast[end] * rate[end] ** 2 / feed**2)
-        terms = [third, 3 * bend[end], slope[end]]
-        factors = [rate[end] ** 3, rate[end] * change[end], jerk]
+        terms = [third, 3 * bends[end], slope[end]]
+        factors = [rate[end] ** 3, rate[end] * changes[end], jerk]
         shares.append(_squared(terms, factors) / limits.jerk**2)
     return casadi.vertcat(*shares)
 
@@ -205,11 +224,11 @@ def _squared(vectors: list[Array], factors: list[Any]) -> Any:
     return total
 
 
-def _driven(start: tuple[float, float, Array], step: Array) -> Array:
-    """(N,) m: s every SAMPLE_S, from s' and s'' at the start and each step's jerk alone."""
-    v, a, j = start
+def _driven(start: tuple[float, float, Array, Array], step: Array) -> Array:
+    """(N,) m: s every SAMPLE_S, from s' and s'' at the start, each step's jerk, and jumps of s'' after it."""
+    v, a, j, jump = start
     begin = _running(0.0, step)
-    change = _running(a, j * step)[:-1]
+    change = _running(a, j * step + jump)[:-1]
     rate = _running(v, step * (change + step * j / 2))[:-1]
     s = _running(0.0, step * (rate + step * (change / 2 + step * j / 6)))[:-1]
     t = np.arange(0.0, begin[-1], SAMPLE_S)
@@ -223,7 +242,7 @@ def _running(start: float, increments: Array) -> Array:
     return np.cumsum(np.concatenate(([start], increments)))
 
 
-def _excess(run: Run, limits: MotionLimits, start: tuple[float, float, Array], step: Array) -> float:
+def _excess(run: Run, limits: MotionLimits, start: tuple[float, float, Array, Array], step: Array) -> float:
     """By how much time must be stretched for finite differences of the motion to keep the limits."""
     s = _driven(start, step)
     position = run.at(s)[0]

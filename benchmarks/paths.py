@@ -67,9 +67,10 @@ class Run:
     where: Array
     """(4, N) s, s', s'', s''' at them"""
 
-    def at(self, s: Array) -> tuple[Array, Array, Array, Array]:
-        """(N,) m -> q, q', q'', q''' (N, 3) each."""
-        piece = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.feed) - 1)
+    def at(self, s: Array, *, before: bool = False) -> tuple[Array, Array, Array, Array]:
+        """(N,) m -> q, q', q'', q''' (N, 3) each; where pieces meet, of the one after or ``before``."""
+        found = np.searchsorted(self.s, s, side="left" if before else "right")
+        piece = np.clip(found - 1, 0, len(self.feed) - 1)
         x = (s - self.s[piece])[:, None]
         c0, c1, c2, c3 = self.curve[:, piece]
         return (

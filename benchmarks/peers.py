@@ -10,6 +10,7 @@ are finite differences of the nozzle's position at 1 kHz, the same for both.
 
 import argparse
 import json
+import math
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
@@ -106,6 +107,20 @@ def _sampled(law: Trapezoids) -> Iterator[Array]:
         yield law.at(np.clip(t, 0.0, law.duration))
 
 
+def stops_cost(commands: Iterable[Command], limits: MotionLimits) -> float:
+    """s: by how much starting and stopping alone takes longer with the jerk limit than without.
+
+    From rest to a speed v, at best: with v = a t the way takes v/2a longer than at v, with jerk
+    (v/a + a/j)/2, or sqrt(v/j) below v = a²/j.
+    """
+    a, j, total = limits.acceleration, limits.jerk, 0.0
+    for part in drawn(commands, limits):
+        if isinstance(part, Polyline):
+            for v in part.feed[[0, -1]].tolist():
+                total += max(v / a + a / j if v * j > a * a else 2 * math.sqrt(v / j), 0.0) / 2 - v / a / 2
+    return total
+
+
 @dataclass(frozen=True, slots=True)
 class Pair:
     """One program, planned both ways."""
@@ -113,6 +128,7 @@ class Pair:
     name: str
     baseline: Motion
     ours: Motion
+    stops_s: float
 
     @property
     def ratio(self) -> float:
@@ -124,7 +140,12 @@ class Pair:
         a, b = self.baseline, self.ours
         times = [f"{a.time_s:.2f}", f"{b.time_s:.2f}", f"{self.ratio:.4f}"]
         peaks = [(a.acceleration_mm_s2, b.acceleration_mm_s2), (a.jerk_mm_s3, b.jerk_mm_s3)]
-        return [self.name, *times, *(f"{value:.0f}" for pair in peaks for value in pair)]
+        return [
+            self.name,
+            *times,
+            f"{self.stops_s:.2f}",
+            *(f"{value:.0f}" for pair in peaks for value in pair),
+        ]
 
 
 def pairs(files: Iterable[Path]) -> Iterator[Pair]:
@@ -132,12 +153,13 @@ def pairs(files: Iterable[Path]) -> Iterator[Pair]:
     profile, limits = machine()
     for path in files:
         commands = read(profile, program_text(path))
-        yield Pair(path.name, baseline(commands, limits), ours(commands, limits))
+        both = baseline(commands, limits), ours(commands, limits)
+        yield Pair(path.name, *both, stops_cost(commands, limits))
 
 
 HEAD = (
-    "| program | baseline s | ours s | ratio | baseline peak mm/s² | ours | baseline peak mm/s³ | ours |\n"
-    "|---|---|---|---|---|---|---|---|"
+    "| program | baseline s | ours s | ratio | stops s | baseline peak mm/s² | ours "
+    "| baseline peak mm/s³ | ours |\n|---|---|---|---|---|---|---|---|---|"
 )
 
 

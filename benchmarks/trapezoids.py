@@ -16,7 +16,7 @@ import numpy as np
 from cdhr_host.motion.arc import chords
 from cdhr_host.motion.curves import points_on
 from cdhr_host.motion.limits import MotionLimits
-from cdhr_host.values import Arc, Array, Command, Dwell, Moves, Pause, Prime, Spline, Stop
+from cdhr_host.values import Arc, Array, Blend, Command, Dwell, Moves, Pause, Prime, Spline, Stop
 
 CHORD = 1e-3
 """m, chords for curves, as firmware commonly draws them"""
@@ -96,20 +96,31 @@ def _pass(speeds: list[float], gain: list[float]) -> list[float]:
 
 
 def drawn(commands: Iterable[Command], limits: MotionLimits) -> list[Polyline | float]:
-    """A program as polylines, and the times (s) it stands between them; G61 is not obeyed."""
+    """A program as polylines, and the times (s) it stands between them; G61 stops after each command."""
     found: list[Polyline | float] = []
     parts: list[Polyline] = []
+    exact = False
     for command in commands:
-        if isinstance(command, Moves):
-            points = np.concatenate((command.start_G[None], command.end_G))
-            parts.append(Polyline(points, np.minimum(command.speed, limits.speed)))
-        elif isinstance(command, Arc | Spline):
-            parts.append(_chords(command, limits))
-        elif isinstance(command, Dwell | Prime | Pause | Stop):
-            found += _joined(parts)
+        if isinstance(command, Moves | Arc | Spline):
+            parts += _lines(command, limits, exact=exact)
+        exact = command.exact if isinstance(command, Blend) else exact
+        if exact or isinstance(command, Blend | Dwell | Prime | Pause | Stop):
+            found += [line for part in parts for line in _joined([part])] if exact else _joined(parts)
             parts = []
+        if isinstance(command, Dwell | Prime | Pause | Stop):
             found.append(_standing(command))
     return found + _joined(parts)
+
+
+def _lines(command: Moves | Arc | Spline, limits: MotionLimits, *, exact: bool) -> list[Polyline]:
+    """What a command draws, each move by itself where it ends in an exact stop."""
+    if not isinstance(command, Moves):
+        return [_chords(command, limits)]
+    points = np.concatenate((command.start_G[None], command.end_G))
+    whole = Polyline(points, np.minimum(command.speed, limits.speed))
+    if not exact:
+        return [whole]
+    return [Polyline(points[k : k + 2], whole.feed[k : k + 1]) for k in range(len(whole.feed))]
 
 
 def _standing(command: Dwell | Prime | Pause | Stop) -> float:

@@ -1,15 +1,14 @@
 """What a leg never exceeds, at any instant: bounds in continuous time, not samples.
 
 On each piece of the time law s', s'' and s''' are bounded by their values at its ends, and
-on the path pieces it runs over |q''| and |q'''| are; |q'| <= 1. So at every instant
-
-    |v| <= s',   |a| <= |q''| s'² + |s''|,   |j| <= |q'''| s'³ + 3 |q''| s' |s''| + |s'''|.
+on the path pieces it runs over |q''|, |q'''| and their parts along the path are (motion.budget).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
+from cdhr_host.motion.budget import Bends
 from cdhr_host.motion.leg import Leg
 from cdhr_host.values import Array, Ints
 
@@ -38,13 +37,14 @@ def leg_bounds(leg: Leg) -> LegBounds:
     after = np.diff(leg.law.t, append=leg.law.duration)
     fastest = np.maximum(speed, speed + after * (change + after * jerk / 2))
     harshest = np.maximum(np.abs(change), np.abs(change + after * jerk))
-    rows = _overlapped(leg.path.start, start, np.append(start[1:], leg.law.end))
-    bend, bend_change = (_largest(bound, rows) for bound in leg.path.bounds())
+    reached = np.clip((start, np.append(start[1:], leg.law.end)), *leg.law.within)
+    rows = _overlapped(leg.path.start, *reached)
+    bends = Bends(*(_largest(row, rows) for row in (*leg.path.bounds(), *leg.path.along())))
     segment = leg.path.segment
     feed = -_largest(-leg.segments.feed[segment], rows)
     flow = _largest(leg.segments.clay[segment], rows) * fastest
-    acceleration = bend * fastest**2 + harshest
-    jerks = bend_change * fastest**3 + 3 * bend * fastest * harshest + np.abs(jerk)
+    acceleration = bends.acceleration(fastest, harshest)
+    jerks = bends.jerk(fastest, harshest, np.abs(jerk))
     return LegBounds(
         float(fastest.max()),
         float((fastest / feed).max()),

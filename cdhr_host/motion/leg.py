@@ -7,16 +7,17 @@ depend on when segments arrived.
 """
 
 import copy
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from cdhr_host.errors import MotionError, Problem
+from cdhr_host.motion.cells import Cells, cells
+from cdhr_host.motion.corner import Allowance, reaches
 from cdhr_host.motion.flow import FlowLimits
-from cdhr_host.motion.limits import Cells, MotionLimits, cells
+from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.look_ahead import border_speeds
-from cdhr_host.motion.smooth_path import STRAIGHT, SmoothPath, norms, reaches, smooth
+from cdhr_host.motion.smooth_path import SmoothPath, norms, smooth
 from cdhr_host.motion.time_law import TimeLaw, time_law
 from cdhr_host.units import MM
 from cdhr_host.values import Array, Flags, Ints
@@ -34,7 +35,7 @@ class FeedOverride:
     factor: float = 1.0
     """of every programmed speed, at least 1; slower is played, not planned (``motion.playback``)"""
     flow: float = 1.0
-    """of the programmed flow, for what the air can push"""
+    """of the programmed flow, at least 1: what the air is to push"""
 
 
 AS_PROGRAMMED = FeedOverride()
@@ -112,10 +113,8 @@ class LegPlanner:
         self._override = override
         self._segments: Segments | None = None
         self._planned = 0
-        self._started = False
-        self._opens = False
         self._first = 0.0
-        self._entry: float | None = 0.0
+        self._entry = 0.0
         self._inside = False
         self._passed = 0.0
 
@@ -147,11 +146,9 @@ class LegPlanner:
         segments = self._segments
         if segments is None:
             return None
-        if not self._started:
-            self._start(segments)
         h = self._limits.half_width
-        rounded = closes and _room(segments.points[::-1], h) < h
-        path = smooth(segments.points, h, opens=self._opens, closes=rounded)
+        allowed = self._allowed(segments)
+        path = smooth(segments.points, h, passed=self._passed, closes=closes, allowed=allowed)
         self._planned = len(segments)
         known = path.end if closes else path.end - max(h, norms(np.diff(segments.points[-2:], axis=0))[0] / 2)
         span = (self._first, float(known))
@@ -165,18 +162,24 @@ class LegPlanner:
             self._limits,
             share=share[path.segment],
             passed=self._passed,
-            inside=self._inside,
+            long=(self._inside or self._first + self._passed == 0.0, closes),
         )
-        speeds, forward = border_speeds(found, self._entry, None if rounded else 0.0)
+        speeds, forward = border_speeds(found, self._entry, 0.0)
         self._check_entry(speeds[0])
         count = len(found.start) if closes else _settled(found, speeds == forward)
         if count == 0:
             return None
-        law = time_law(found.first(count), speeds[: count + 1])
+        law = time_law(found.only(slice(count)), speeds[: count + 1])
         leg = Leg(path, law, segments, self._number, self._passed)
         if not closes:
-            self._advance(found, count, float(speeds[count]))
+            self._advance(path, found, count, float(speeds[count]))
         return leg
+
+    def _allowed(self, segments: Segments) -> Allowance:
+        """As programmed, so that the path is the same with any feed."""
+        limits = self._limits
+        share = limits.flow.share(segments.feed, segments.clay, limits.acceleration)
+        return Allowance(segments.feed, share, limits.acceleration, limits.jerk)
 
     def _paces(self, segments: Segments) -> tuple[Array, Array]:
         """(M,) m/s wanted, (M,) share of acceleration and jerk that the air leaves for changing it."""
@@ -184,31 +187,24 @@ class LegPlanner:
         feed = segments.wanted(self._override, limits.flow)
         return feed, limits.flow.share(feed, segments.clay, limits.acceleration)
 
-    def _start(self, segments: Segments) -> None:
-        """Begin at rest in time where the path begins straight, else at rest in s."""
-        self._started = True
-        if _room(segments.points, self._limits.half_width) < self._limits.half_width:
-            self._opens, self._first, self._entry = True, -self._limits.half_width, None
-
-    def _advance(self, found: Cells, count: int, speed: float) -> None:
+    def _advance(self, path: SmoothPath, found: Cells, count: int, speed: float) -> None:
         """Forget what is committed, but for the path the kernel still reaches back to."""
         segments = self._segments
         assert segments is not None
         border = float(found.start[count])
+        drawn = path.drawn
         lengths = norms(np.diff(segments.points, axis=0))
-        drawn = np.concatenate(([0.0], np.cumsum(lengths)))
         over = np.maximum.accumulate(drawn + reaches(lengths, self._limits.half_width))
         first = max(int(np.searchsorted(over, border, side="right")) - 1, 0)
         self._segments = segments.part(first, len(segments))
         self._planned = len(self._segments)
-        self._opens = self._opens and first == 0
         self._first = border - drawn[first]
         self._passed += float(drawn[first])
         self._entry = speed
         self._inside = bool(found.bent[count])
 
     def _check_entry(self, speed: float) -> None:
-        if self._entry is not None and speed < self._entry * (1 - 1e-9):
+        if speed < self._entry * (1 - 1e-9):
             assert self._segments is not None
             raise MotionError(
                 Problem(
@@ -220,24 +216,15 @@ class LegPlanner:
             )
 
 
-def _room(points: Array, enough: float) -> float:
-    """(M+1, 3) m -> m from the first point to the first corner, infinite if there is none."""
-    near = int(np.searchsorted(np.cumsum(norms(np.diff(points, axis=0))), enough)) + 2
-    steps = np.diff(points[: near + 1], axis=0)
-    lengths = norms(steps)
-    direction = steps / lengths[:, None]
-    corners = np.flatnonzero(norms(np.diff(direction, axis=0)) > STRAIGHT)
-    return float(lengths[: corners[0] + 1].sum()) if len(corners) else math.inf
-
-
 def _settled(found: Cells, final: Flags) -> int:
     """How many cells can be committed: up to a border whose speed nothing further can raise.
 
     Braking to rest begins at the last such border. What follows may instead end the leg in
     a slower cell, and slowing down to a third of a speed takes 9 % more way than to rest; so
-    the border is taken that leaves MORE_ROOM beyond the way that rest would need.
+    the border is taken that leaves MORE_ROOM beyond the way that rest would need. A straight after
+    a corner that is braked into stays with that corner.
     """
-    usable = np.flatnonzero(final[:-1] & (found.start < found.settled))
+    usable = np.flatnonzero(final[:-1] & (found.start < found.settled) & (found.pulls[0] == 0.0))
     if not len(usable):
         return 0
     room = np.concatenate(([0.0], np.cumsum(np.where(found.acceleration > 0.0, found.length, 0.0))))

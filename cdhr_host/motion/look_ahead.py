@@ -1,17 +1,30 @@
-"""Speeds at the borders of cells, in closed form.
+"""Speeds at the borders of cells.
 
-At every border s'' = 0. A speed change from v0 to v1 with s'' = 0 at both ends and
-|s''| <= a, |s'''| <= j takes T = 2 sqrt(d/j) if d = |v1 - v0| <= a²/j, else d/a + a/j,
-over the distance (v0 + v1)/2 · T.
+A speed change from v0 to v1 with s'' = 0 at both ends and |s''| <= a, |s'''| <= j takes
+T = 2 sqrt(d/j) if d = |v1 - v0| <= a²/j, else d/a + a/j, over the distance (v0 + v1)/2 · T.
+
+At most borders s'' = 0. Beside a corner that is braked into, a straight begins with
+s'' = b v² or ends with -b v² (``Cells.pulls``). It is then part of a longer change, from
+the speed v - (b v²)²/2j at which s'' would have been 0 with full jerk, and must rise to at
+least v + (b v²)²/2j before it can fall.
 """
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdhr_host.motion.limits import Cells
-from cdhr_host.values import Array
+from cdhr_host.motion.cells import Cells
+from cdhr_host.values import Array, Ints
+
+NEWTON_STEPS = 8
+"""From above, towards the root of a rising convex function that is never flat."""
+HALVINGS = 48
+"""Of an interval of speeds: to rounding."""
+SPARE = 1 - 1e-6
+"""Of the length of a cell with pulls: near an end's peak it varies with the root of rounding."""
+CLOSE = 1e-13
+"""m, how well a search meets the length of a cell, from below."""
 
 
 def change_distance(v0: Array, v1: Array, a: Array, j: Array) -> Array:
@@ -43,40 +56,129 @@ def reachable(v0: float, length: float, a: float, j: float) -> float:
     return v0 + 4 * c / (b + math.sqrt(b * b + 8 * c))
 
 
-def border_speeds(cells: Cells, entry: float | None, exit_speed: float | None) -> tuple[Array, Array]:
+@dataclass(frozen=True, slots=True)
+class End:
+    """One end of K cells, as the speed change sees it that the cell is part of."""
+
+    change: Array
+    """(K,) m/s², how s'' rises from this end inwards"""
+    least: Array
+    """(K,) m/s, the speed at which the whole change begins"""
+    spared: Array
+    """(K,) m, the part of the whole change that lies beyond the end"""
+    peak: Array
+    """(K,) m/s, the least speed to which it must lead"""
+
+    def only(self, which: Ints) -> "End":
+        """Those of some of the cells."""
+        return End(self.change[which], self.least[which], self.spared[which], self.peak[which])
+
+
+def end(speed: Array, pull: Array, jerk: Array) -> End:
+    """Ends at which s' is (K,) m/s and s'' = pull s'²."""
+    change = pull * speed**2
+    time = np.divide(change, jerk, out=np.zeros_like(change), where=change > 0)
+    gain = change * time / 2
+    least = speed - gain
+    return End(change, least, (least + gain / 3) * time, speed + gain)
+
+
+def ends(cells: Cells, borders: Array) -> tuple[End, End]:
+    """Both ends of each cell, of border speeds (K+1,) m/s."""
+    return end(borders[:-1], cells.pulls[0], cells.jerk), end(borders[1:], cells.pulls[1], cells.jerk)
+
+
+def needed(both: tuple[End, End], peak: Array, cells: Cells) -> Array:
+    """(K,) m: the way from the first end up to a peak (K,) m/s and down to the other end."""
+    a, j = cells.acceleration, cells.jerk
+    return sum((change_distance(one.least, peak, a, j) - one.spared for one in both), np.zeros(len(peak)))
+
+
+def _shortest(both: tuple[End, End], cells: Cells) -> Array:
+    """(K,) m: the least length in which a cell can have these ends."""
+    return needed(both, np.maximum(both[0].peak, both[1].peak), cells)
+
+
+def _below_peak(peak: Array, pull: Array, jerk: Array) -> Array:
+    """(K,) m/s: speed of an end that leads to a peak, v + (pull v²)²/2j = peak."""
+    speed, steep = peak.copy(), np.divide(pull**2, 2 * jerk, out=np.zeros_like(pull), where=pull > 0)
+    for _ in range(NEWTON_STEPS if pull.any() else 0):
+        speed -= (speed + steep * speed**4 - peak) / (1 + 4 * steep * speed**3)
+    return speed
+
+
+def border_speeds(cells: Cells, entry: float, exit_speed: float) -> tuple[Array, Array]:
     """(K+1,) speeds at the borders, and the ones a forward pass alone would allow.
 
-    ``entry`` is the speed already given at the first border, or None where the path opens
-    and any speed will do; ``exit_speed`` likewise at the last. A border whose two speeds
+    ``entry`` and ``exit_speed`` are given at the first border and the last. A border whose two speeds
     agree cannot become faster by knowing more of the path.
     """
-    cap = np.minimum(np.append(cells.speed, np.inf), np.concatenate(([np.inf], cells.speed)))
-    if entry is not None:
-        cap[0] = entry
+    cap = _caps(cells)
+    cap[0] = entry
     forward = _pass(cap, cells)
     cap = forward.copy()
-    if exit_speed is not None:
-        cap[-1] = min(exit_speed, cap[-1])
+    cap[-1] = min(exit_speed, cap[-1])
     backward = _pass(cap[::-1], _reversed(cells))[::-1]
     return backward, forward
 
 
 def _reversed(cells: Cells) -> Cells:
     return replace(
-        cells, length=cells.length[::-1], acceleration=cells.acceleration[::-1], jerk=cells.jerk[::-1]
+        cells,
+        length=cells.length[::-1],
+        acceleration=cells.acceleration[::-1],
+        jerk=cells.jerk[::-1],
+        pulls=cells.pulls[::-1, ::-1],
     )
+
+
+def _caps(cells: Cells) -> Array:
+    """(K+1,) m/s: what the cells on both sides of a border allow, by themselves."""
+    sides = [_below_peak(cells.speed, pull, cells.jerk) for pull in cells.pulls]
+    sides = [np.minimum(side, _pulling(pull, cells)) for side, pull in zip(sides, cells.pulls, strict=True)]
+    cap = np.minimum(np.append(sides[0], np.inf), np.concatenate(([np.inf], sides[1])))
+    pulled = np.flatnonzero(cells.pulls.any(axis=0))
+    if len(pulled):
+        some = cells.only(pulled)
+        both = end(cap[pulled], some.pulls[0], some.jerk), end(cap[pulled + 1], some.pulls[1], some.jerk)
+        short = _shortest(both, some) > some.length
+        narrow = pulled[short]
+        for border, speed in zip((narrow, narrow + 1), _narrowed(cells.only(narrow)), strict=True):
+            np.minimum.at(cap, border, speed)
+    return cap
+
+
+def _pulling(pull: Array, cells: Cells) -> Array:
+    """(K,) m/s: the speed at which s'' at an end is the cell's greatest."""
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        return np.asarray(np.where(pull > 0.0, np.sqrt(cells.acceleration / pull), np.inf))
+
+
+def _narrowed(cells: Cells) -> tuple[Array, Array]:
+    """Greatest speeds of both ends of cells, leading to the same peak, that their lengths allow."""
+    low, high = np.zeros(len(cells.length)), cells.speed.copy()
+    for _ in range(HALVINGS if len(low) else 0):
+        middle = (low + high) / 2
+        both = [end(_below_peak(middle, pull, cells.jerk), pull, cells.jerk) for pull in cells.pulls]
+        fits = needed((both[0], both[1]), middle, cells) <= SPARE * cells.length
+        low, high = np.where(fits, middle, low), np.where(fits, high, middle)
+    return _below_peak(low, cells.pulls[0], cells.jerk), _below_peak(low, cells.pulls[1], cells.jerk)
 
 
 def _pass(cap: Array, cells: Cells) -> Array:
     """(K+1,) -> (K+1,): each speed lowered to what the one before it can reach."""
-    needed = change_distance(cap[:-1], np.maximum(cap[1:], cap[:-1]), cells.acceleration, cells.jerk)
-    short = needed > cells.length
+    first, last = ends(cells, cap)
+    short = (_shortest((first, last), cells) > cells.length) & (last.peak > first.peak)
     speeds = cap.tolist()
     length, a, j = cells.length.tolist(), cells.acceleration.tolist(), cells.jerk.tolist()
+    pulls = cells.pulls.T.tolist()
     for i in np.flatnonzero(short).tolist():
         k = i
-        while k < len(length) and speeds[k + 1] > speeds[k]:
-            reached = reachable(speeds[k], length[k], a[k], j[k])
+        while k < len(length):
+            if any(pulls[k]):
+                reached = _pulled(speeds[k], speeds[k + 1], length[k], (a[k], j[k]), pulls[k])
+            else:
+                reached = reachable(speeds[k], length[k], a[k], j[k])
             if reached >= speeds[k + 1]:
                 break
             speeds[k + 1] = reached
@@ -84,14 +186,81 @@ def _pass(cap: Array, cells: Cells) -> Array:
     return np.array(speeds)
 
 
-def peak_speeds(cells: Cells, borders: Array) -> Array:
-    """(K,) m/s: greatest speed inside each cell between its border speeds."""
-    v0, v1, a, j = borders[:-1], borders[1:], cells.acceleration, cells.jerk
-    low, high = np.maximum(v0, v1), np.maximum(cells.speed, np.maximum(v0, v1))
-    fits = change_distance(v0, high, a, j) + change_distance(high, v1, a, j) <= cells.length
-    low = np.where(fits, high, low)
-    for _ in range(48):
-        middle = (low + high) / 2
-        fits = change_distance(v0, middle, a, j) + change_distance(middle, v1, a, j) <= cells.length
-        low, high = np.where(fits, middle, low), np.where(fits, high, middle)
+@dataclass(frozen=True, slots=True)
+class _Way:
+    """By how much one cell with pulls is too short to go from a given end to one at v1."""
+
+    first: tuple[float, float, float]
+    """least, spared and peak of the given end, as in ``End``"""
+    length: float
+    a: float
+    j: float
+    pull: float
+    """of the other end"""
+
+    def lacking(self, v1: float) -> float:
+        """m"""
+        least, spared, peak = _end(v1, self.pull, self.j)
+        peak = max(peak, self.first[2])
+        there, back = self._change(self.first[0], peak), self._change(least, peak)
+        return there + back - self.first[1] - spared - self.length
+
+    def _change(self, low: float, high: float) -> float:
+        d, knee = high - low, self.a * self.a / self.j
+        time = 2 * math.sqrt(d / self.j) if d <= knee else d / self.a + self.a / self.j
+        return (low + high) / 2 * time
+
+    def below_peak(self) -> float:
+        """m/s: speed of the other end that leads to the given end's peak."""
+        peak = speed = self.first[2]
+        steep = self.pull**2 / (2 * self.j)
+        for _ in range(NEWTON_STEPS if steep else 0):
+            speed -= (speed + steep * speed**4 - peak) / (1 + 4 * steep * speed**3)
+        return speed
+
+
+def _end(speed: float, pull: float, jerk: float) -> tuple[float, float, float]:
+    time = pull * speed**2 / jerk
+    gain = jerk * time * time / 2
+    return speed - gain, (speed - gain + gain / 3) * time, speed + gain
+
+
+def _pulled(v0: float, v1: float, length: float, limits: tuple[float, float], pulls: list[float]) -> float:
+    """m/s: greatest speed up to v1 that a cell with pulls reaches from v0."""
+    way = _Way(_end(v0, pulls[0], limits[1]), SPARE * length, *limits, pulls[1])
+    low, high = way.below_peak(), v1
+    if low >= high or (over := way.lacking(high)) <= 0.0:
+        return v1
+    under, kept = way.lacking(low), 0
+    # Illinois method: false position, with the value halved at an end that stays.
+    while under < -CLOSE:
+        middle = (low * over - high * under) / (over - under)
+        found = way.lacking(middle)
+        if found > 0.0:
+            high, over, under = middle, found, under / 2 if kept == 1 else under
+            kept = 1
+        else:
+            low, under, over = middle, found, over / 2 if kept == -1 else over
+            kept = -1
+            if found >= -CLOSE:
+                break
+        if high - low <= 1e-15:
+            break
     return low
+
+
+def peak_speeds(cells: Cells, both: tuple[End, End]) -> Array:
+    """(K,) m/s: greatest speed inside each cell between its ends."""
+    least = np.maximum(both[0].peak, both[1].peak)
+    peaks = np.maximum(cells.speed, least)
+    length = np.where(cells.pulls.any(axis=0), SPARE, 1.0) * cells.length
+    short = np.flatnonzero(needed(both, peaks, cells) > length)
+    if len(short):
+        some, ends_there = cells.only(short), (both[0].only(short), both[1].only(short))
+        low, high = least[short], peaks[short]
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            fits = needed(ends_there, middle, some) <= length[short]
+            low, high = np.where(fits, middle, low), np.where(fits, high, middle)
+        peaks[short] = low
+    return peaks

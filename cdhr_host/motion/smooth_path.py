@@ -11,18 +11,22 @@ h: q(s) = integral K(u) p(s - u) du, K(u) = (h - |u|)/h². The result is a cubic
   at most h/3 from the drawn path, and passes within h/3 of each of its points.
 
 Chords of a curve are smoothed together because the kernel spans them; a line stays a line.
-An exact stop is one more corner, from or to direction zero: there the curve starts or ends
-at rest in s itself (q' = q'' = 0), h before the first and h after the last point.
+Towards an exact stop the kernels become narrower, so that none reaches beyond it. While widths
+differ by no more than the corners are apart q' stays an average of unit vectors, and by partial
+summation q leaves p by no more than a third of the greatest width.
 
 A corner that stands alone gets a kernel of its own, wider the less it turns: no kernel but
 its own reaches where its segments' halves do, and there q leaves p by |turn| h/6 at most, so
 that h = 2 h0/|turn| makes use of the h0/3 that all are allowed.
 """
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from cdhr_host.motion.corner import Allowance, Rounding, roundings
 from cdhr_host.values import Array, Flags, Ints
 
 STRAIGHT = 1e-9
@@ -43,6 +47,11 @@ class SmoothPath:
     """(K,) drawn segment each piece follows"""
     bending: Ints
     """(K,) corners whose kernel reaches into the piece; 0 where the path is straight"""
+    brake: Array
+    """(2, K) 1/m, in corners that are braked into: by how much more s'' shrinks on the straight before,
+    and grows on the one after, than s'² would make it"""
+    drawn: Array
+    """(M+1,) m, s from which each drawn segment goes on straight; for the last point, its end"""
 
     def lengths(self) -> Array:
         """(K,) m: length in s of each piece."""
@@ -55,6 +64,25 @@ class SmoothPath:
         largest = np.maximum(norms(second.T), norms(after.T))
         bent = self.bending > 0
         return np.where(bent, largest, 0.0), np.where(bent, norms(third.T), 0.0)
+
+    def along(self) -> tuple[Array, Array]:
+        """((K,), (K,)): bounds of |q' q''| (1/m) and |q' q'''| (1/m²) within each piece.
+
+        The greatest of the coefficients in Bernstein's polynomials.
+        """
+        _, slope, second, third = self.coefficients
+        x = self.lengths()
+        after = second + third * x
+        middle, last = slope + second * x / 2, slope + (second + after) * x / 2
+        rises = (
+            _dot(slope, second),
+            (2 * _dot(middle, second) + _dot(slope, after)) / 3,
+            (_dot(last, second) + 2 * _dot(middle, after)) / 3,
+            _dot(last, after),
+        )
+        turns = [_dot(each, third) for each in (slope, middle, last)]
+        bent = self.bending > 0
+        return np.where(bent, _greatest(rises), 0.0), np.where(bent, _greatest(turns), 0.0)
 
     def at(self, s: Array) -> tuple[Ints, Array, Array, Array]:
         """(N,) -> piece (N,), q, q', q'' (N, 3) each."""
@@ -69,37 +97,58 @@ class SmoothPath:
         return piece, value.T, slope.T, bend.T
 
 
-def smooth(points: Array, h: float, *, opens: bool, closes: bool) -> SmoothPath:
+def smooth(
+    points: Array,
+    h: float,
+    *,
+    passed: float = math.inf,
+    closes: bool = False,
+    allowed: Allowance | None = None,
+) -> SmoothPath:
     """(M+1, 3) m: the smoothed path of a polyline with M segments of positive length.
 
-    ``opens`` and ``closes`` say whether the polyline starts and ends at rest. Where it does
-    not, it is part of a longer one, and the result is exact only from h after the first
-    point to h before the last. Pieces begin at s = -h, and end at the last point, or h
-    after it where the polyline closes.
+    It is part of a path that began ``passed`` m before the first point and ends, if it
+    ``closes``, at the last; there the result is the drawn path. Otherwise it is exact only from
+    the farthest reach of a kernel after the first point to as much before the last. Pieces begin
+    at s = -h. With an allowance, corners that would cost much speed are braked into.
     """
     steps = np.diff(points, axis=0)
     lengths = norms(steps)
     drawn = np.concatenate(([0.0], np.cumsum(lengths)))
     direction = steps / lengths[:, None]
-    corner, turn = _corners(direction, opens=opens, closes=closes)
-    last = drawn[-1] + h if closes else drawn[-1]
-    width = _widths(lengths, corner, turn, h)
-    knots, third, bending = _knots(drawn[corner], turn, width, np.append(drawn[:-1], -h), last)
+    corner, turns = _corners(direction)
+    ends = np.minimum(passed + drawn[corner], drawn[-1] - drawn[corner] if closes else math.inf)
+    rounding = roundings(lengths, corner, turns, (h, ends), allowed)
+    saved = np.zeros((2, len(points)))
+    saved[:, corner] = rounding.saved
+    after = drawn + np.cumsum(saved.sum(axis=0))
+    middle = after - saved[1]
+    last = after[-1]
+    knots, kinks = _knots(middle[corner], turns, rounding, np.append(middle[:-1], -h), last)
     widths = np.diff(knots, append=last)[:, None]
-    segment = np.clip(np.searchsorted(drawn, knots, side="right") - 1, 0, len(lengths) - 1)
-    straight = bending == 0
-    second = _before(third * widths)
+    segment = np.clip(np.searchsorted(middle, knots, side="right") - 1, 0, len(lengths) - 1)
+    third, straight = kinks.third, kinks.bending == 0
+    second = _before(third * widths) + kinks.second
     second[straight] = 0.0
-    initial = np.zeros(3) if opens else direction[0]
+    initial = direction[0]
     slope = initial + _before(second * widths + third * widths**2 / 2)
     slope = _anchored(slope, direction[segment], straight)
     increments = slope * widths + second * widths**2 / 2 + third * widths**3 / 6
     value = points[0] - h * initial + _before(increments)
-    value = _anchored(
-        value, points[segment] + (knots - drawn[segment])[:, None] * direction[segment], straight
-    )
+    onwards = points[segment] + (knots - after[segment])[:, None] * direction[segment]
+    value = _anchored(value, onwards, straight)
     coefficients = np.stack([np.ascontiguousarray(rows.T) for rows in (value, slope, second, third)])
-    return SmoothPath(knots, float(last), coefficients, segment, bending)
+    return SmoothPath(knots, float(last), coefficients, segment, kinks.bending, kinks.brake, after)
+
+
+def _dot(a: Array, b: Array) -> Array:
+    """(3, K), (3, K) -> (K,)."""
+    return np.asarray(np.einsum("kn,kn->n", a, b), dtype=np.float64)
+
+
+def _greatest(rows: Sequence[Array]) -> Array:
+    """Greatest size of each column."""
+    return np.asarray(np.max(np.abs(rows), axis=0), dtype=np.float64)
 
 
 def _anchored(sums: Array, drawn: Array, straight: Flags) -> Array:
@@ -112,44 +161,56 @@ def _anchored(sums: Array, drawn: Array, straight: Flags) -> Array:
     return np.asarray(sums + shift, dtype=np.float64)
 
 
-def _corners(direction: Array, *, opens: bool, closes: bool) -> tuple[Ints, Array]:
-    """Points at which the direction changes, and by which vector."""
-    rest = np.zeros((1, 3))
-    around = np.concatenate((rest if opens else direction[:1], direction, rest if closes else direction[-1:]))
+def _corners(direction: Array) -> tuple[Ints, tuple[Array, Array]]:
+    """Points at which the direction changes, and the directions before and after."""
+    around = np.concatenate((direction[:1], direction, direction[-1:]))
     bends = np.flatnonzero(norms(np.diff(around, axis=0)) > STRAIGHT)
     # Each corner takes along the turns before it that were too small to be one.
     before = around[np.concatenate(([0], bends[:-1] + 1))] if len(bends) else around[:0]
-    return bends, around[bends + 1] - before
+    return bends, (before, around[bends + 1])
 
 
-def reaches(lengths: Array, h: float) -> Array:
-    """(M,) m -> (M+1,) m: how far the kernel of a corner at each point may reach along the path."""
-    half = np.concatenate(([0.0], lengths, [0.0])) / 2
-    return np.maximum(np.minimum(half[:-1], half[1:]), h)
+@dataclass(frozen=True, slots=True)
+class _Kinks:
+    """What changes from piece to piece."""
+
+    third: Array
+    """(K, 3) q''' on each piece"""
+    second: Array
+    """(K, 3) sum of the jumps of q'' up to each piece"""
+    bending: Ints
+    """(K,) corners whose rounding reaches into the piece"""
+    brake: Array
+    """(2, K) 1/m of the corner there"""
 
 
-def _widths(lengths: Array, corner: Ints, turn: Array, h: float) -> Array:
-    """(K,) m: half-width of each corner's kernel."""
-    return np.maximum(np.minimum(reaches(lengths, h)[corner], 2 * h / norms(turn)), h)
+def _knots(
+    middle: Array, turns: tuple[Array, Array], rounding: Rounding, also: Array, last: float
+) -> tuple[Array, _Kinks]:
+    """Piece starts (K,), and what is on each.
 
-
-def _knots(corner: Array, turn: Array, width: Array, also: Array, last: float) -> tuple[Array, Array, Ints]:
-    """Piece starts (K,), q''' on each (K, 3), and how many kernels reach into it (K,).
-
-    Pieces begin where a kernel does, at its middle and end, and ``also`` elsewhere.
+    Pieces begin where a rounding does, at its middle and end, and ``also`` elsewhere.
     """
-    at = np.concatenate((corner - width, corner, corner + width, also))
-    jump = np.zeros((len(at), 3))
-    count = np.zeros(len(at), dtype=np.int64)
-    n, steep = len(corner), turn / width[:, None] ** 2
-    jump[:n], jump[n : 2 * n], jump[2 * n : 3 * n] = steep, -2 * steep, steep
-    count[:n], count[2 * n : 3 * n] = 1, -1
+    (before, after), half, brake = turns, rounding.half, rounding.brake
+    at = np.concatenate((middle - half, middle, middle + half, also))
+    first, second = (old[:, None] * before + new[:, None] * after for old, new in rounding.third)
+    none = np.zeros((len(also), 3))
     order = np.argsort(at, kind="stable")
     at = np.clip(at[order], also[-1], last)
-    third, active = np.cumsum(jump[order], axis=0), np.cumsum(count[order])
     keep = np.diff(at, append=last) > 0
+    one = np.ones(len(half))
+    active = np.cumsum(np.concatenate((one, 0 * one, -one, none[:, 0]))[order])
+    third = np.cumsum(np.concatenate((first, second - first, -second, none))[order], axis=0)
     third[active == 0] = 0.0
-    return at[keep], third[keep], active[keep]
+    entering, leaving = brake[:, :, None]
+    jump, braked = np.zeros_like(third), np.zeros((2, len(at)))
+    if brake.any():
+        jumps = np.concatenate((-entering * before, 0 * first, -leaving * after, none))
+        jump = np.cumsum(jumps[order], axis=0)
+        braking = np.concatenate((brake, 0 * brake, -brake, np.zeros((2, len(also)))), axis=1)
+        braked = np.where(active > 0, np.cumsum(braking[:, order], axis=1), 0.0)
+    bending = active.astype(np.int64)
+    return at[keep], _Kinks(third[keep], jump[keep], bending[keep], braked[:, keep])
 
 
 def _before(increments: Array) -> Array:

@@ -4,10 +4,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdhr_host.motion.limits import Cells
-from cdhr_host.motion.look_ahead import change_distance, peak_speeds
+from cdhr_host.motion.cells import Cells
+from cdhr_host.motion.look_ahead import ends, peak_speeds
 from cdhr_host.motion.speed_change import speed_change
 from cdhr_host.values import Array
+
+INSIDE = 1e-12
+"""m, by how much s keeps off the borders of its cell: s'' may jump there, and q'' with it, so that
+rounding must not pair a law with the path beyond. More than rounding on a long leg."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +26,8 @@ class TimeLaw:
     """m, s at the end"""
     state: Array
     """(4, K) s (m), s' (m/s), s'' (m/s²) at the start, s''' (m/s³)"""
+    within: Array
+    """(2, K) m, first and last s of the cell it runs through, less what rounding might exceed"""
 
     def at(self, t: Array) -> tuple[Array, Array, Array]:
         """(N,) s -> s, s', s'' (N,) each."""
@@ -29,7 +35,7 @@ class TimeLaw:
         x = t - self.t[piece]
         s, v, a, j = (row[piece] for row in self.state)
         return (
-            s + x * (v + x * (a / 2 + x * (j / 6))),
+            np.clip(s + x * (v + x * (a / 2 + x * (j / 6))), *self.within[:, piece]),
             v + x * (a + x * (j / 2)),
             a + x * j,
         )
@@ -40,35 +46,60 @@ def time_law(cells: Cells, borders: Array) -> TimeLaw:
 
     In each cell the speed rises to a peak, cruises, and falls to the next border.
     """
-    peaks = peak_speeds(cells, borders)
+    both = ends(cells, borders)
+    peaks = peak_speeds(cells, both)
     duration = np.zeros((len(peaks), 7))
     jerk = np.zeros((len(peaks), 7))
-    rise = change_distance(borders[:-1], peaks, cells.acceleration, cells.jerk)
-    fall = change_distance(peaks, borders[1:], cells.acceleration, cells.jerk)
-    duration[:, 3] = np.maximum(cells.length - rise - fall, 0.0) / peaks
-    _change(duration[:, :3], jerk[:, :3], borders[:-1], peaks, cells)
-    _change(duration[:, 4:], jerk[:, 4:], peaks, borders[1:], cells)
-    end = float(cells.start[-1] + cells.length[-1])
-    return _integrated(cells.start, borders[:-1], end, duration, jerk)
+    a0, a1 = both[0].change, both[1].change
+    none = np.zeros(len(peaks))
+    _change(duration[:, :3], jerk[:, :3], (borders[:-1], peaks), (a0, none), cells)
+    _change(duration[:, 4:], jerk[:, 4:], (peaks, borders[1:]), (none, -a1), cells)
+    way = _way(duration[:, :3], jerk[:, :3], borders[:-1], a0) + _way(
+        duration[:, 4:], jerk[:, 4:], peaks, none
+    )
+    duration[:, 3] = np.maximum(cells.length - way, 0.0) / peaks
+    last = float(cells.start[-1] + cells.length[-1])
+    return _integrated(cells.start, (borders[:-1], a0), last, duration, jerk)
 
 
-def _change(duration: Array, jerk: Array, v0: Array, v1: Array, cells: Cells) -> None:
-    """Fill in the three pieces (K, 3) of each cell whose speed changes from v0 to v1."""
+def _change(
+    duration: Array, jerk: Array, speed: tuple[Array, Array], change: tuple[Array, Array], cells: Cells
+) -> None:
+    """Fill in the three pieces (K, 3) of each cell whose speed changes, with s'' at both ends of that."""
+    (v0, v1), (a0, a1) = speed, change
     for k in np.flatnonzero(v0 != v1).tolist():
-        t, j = speed_change(float(v0[k]), float(v1[k]), float(cells.acceleration[k]), float(cells.jerk[k]))
-        duration[k], jerk[k] = t[:3], j[:3]
+        a, j = float(cells.acceleration[k]), float(cells.jerk[k])
+        t, jerks = speed_change(float(v0[k]), float(v1[k]), a, j, (float(a0[k]), float(a1[k])))
+        duration[k], jerk[k] = t[:3], jerks[:3]
 
 
-def _integrated(s: Array, v: Array, last: float, duration: Array, jerk: Array) -> TimeLaw:
-    """Pieces (K, 7) of each cell, from its start s and speed v (K,), as one law ending at s = last."""
+def _way(duration: Array, jerk: Array, v: Array, a: Array) -> Array:
+    """(K,) m: the way of pieces (K, 3) from speed v and s'' (K,)."""
+    way = np.zeros(len(v))
+    for x, j in zip(duration.T, jerk.T, strict=True):
+        way += x * (v + x * (a / 2 + x * (j / 6)))
+        v, a = v + x * (a + x * (j / 2)), a + x * j
+    return way
+
+
+def _integrated(
+    begin: Array, first: tuple[Array, Array], last: float, duration: Array, jerk: Array
+) -> TimeLaw:
+    """Pieces (K, 7) of each cell, from its start s, s' and s'' (K,), as one law ending at s = last."""
     state = np.zeros((4, *duration.shape))
-    state[0, :, 0], state[1, :, 0], state[3] = s, v, jerk
+    state[0, :, 0], state[3] = begin, jerk
+    state[1, :, 0], state[2, :, 0] = first
     for i in range(6):
         x, (s, v, a, j) = duration[:, i], state[:, :, i]
         state[0, :, i + 1] = s + x * (v + x * (a / 2 + x * (j / 6)))
         state[1, :, i + 1] = v + x * (a + x * (j / 2))
         state[2, :, i + 1] = a + x * j
+        # In between the speed neither rises nor falls.
+        if i == 2:
+            state[2, :, 3] = 0.0
     end = np.cumsum(duration)
     lasting = duration.ravel() > 0
     start = np.concatenate(([0.0], end[:-1]))[lasting]
-    return TimeLaw(start, float(end[-1]), last, state.reshape(4, -1)[:, lasting])
+    within = np.stack((np.append(begin[0], begin[1:] + INSIDE), np.append(begin[1:] - INSIDE, last)))
+    within = within.repeat(7, axis=1)
+    return TimeLaw(start, float(end[-1]), last, state.reshape(4, -1)[:, lasting], within[:, lasting])

@@ -49,7 +49,7 @@ def test_a_smoothed_arc_has_the_arcs_own_curvature(radius, degrees, half_width):
     """Ripple of q'' below 1 %; the radius is the arc's less h²/(12 R), to the chords' micrometre."""
     degrees *= min(1.0, 0.1 / radius) * max(1.0, 0.006 / radius)
     points = chords(arc_of(radius, degrees), half_width)
-    path = smooth(points, half_width, opens=False, closes=False)
+    path = smooth(points, half_width)
     length = radius * abs(math.radians(degrees))
     places = np.linspace(half_width, length - half_width * (1 + 1e-6), 4001)
     assert places[-1] > places[0]
@@ -66,9 +66,7 @@ def test_a_smoothed_arc_has_the_arcs_own_curvature(radius, degrees, half_width):
 def test_two_chords_in_the_kernel_would_ripple_where_they_do_not_fit():
     """What the whole number of chords in the kernel is for: 2.5 of them ripple by 3 %."""
     angle = np.arange(0, 200) * (H / 2.5 / 0.05)
-    path = smooth(
-        0.05 * np.column_stack((np.cos(angle), np.sin(angle), 0 * angle)), H, opens=False, closes=False
-    )
+    path = smooth(0.05 * np.column_stack((np.cos(angle), np.sin(angle), 0 * angle)), H)
     curvature = norm(path.at(np.linspace(3 * H, path.end - 3 * H, 4001))[3])
     assert np.abs(curvature / curvature.mean() - 1).max() > 0.025
 
@@ -113,8 +111,8 @@ def test_a_smoothed_bezier_has_the_curves_own_curvature(name):
     """Against the same smoothing of chords twenty times as fine."""
     spline = spline_of(CURVES[name])
     control = spline.control_G
-    fine = smooth(bezier(control, np.linspace(0, 1, 20001)), H, opens=False, closes=False)
-    path = smooth(points_on(spline, H), H, opens=False, closes=False)
+    fine = smooth(bezier(control, np.linspace(0, 1, 20001)), H)
+    path = smooth(points_on(spline, H), H)
     share = np.linspace(0.05, 0.95, 2001)
     (_, here, _, bend), (_, there, _, wanted) = (q.at(share * q.end) for q in (path, fine))
     assert np.abs(here - there).max() < 3e-6

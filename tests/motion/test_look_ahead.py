@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cdhr_host.errors import MotionError
-from cdhr_host.motion.limits import Cells
-from cdhr_host.motion.look_ahead import border_speeds, change_distance, peak_speeds, reachable
+from cdhr_host.motion.cells import Cells
+from cdhr_host.motion.look_ahead import border_speeds, change_distance, ends, needed, peak_speeds, reachable
 from cdhr_host.motion.speed_change import speed_change
+from cdhr_host.motion.time_law import time_law
 
 SPEED = st.floats(1e-4, 0.3)
 
@@ -19,12 +20,13 @@ def distance(v0, v1, a, j):
     return float(change_distance(np.array([v0]), np.array([v1]), np.array([a]), np.array([j]))[0])
 
 
-def cells(length, speed, a, j):
+def cells(length, speed, a, j, pulls=None):
     length = np.asarray(length, float)
     start = np.concatenate(([0.0], np.cumsum(length)[:-1]))
     bent = np.zeros(len(length), bool)
     columns = (np.broadcast_to(np.asarray(x, float), len(length)) for x in (speed, a, j))
-    return Cells(start, length, *columns, float(length.sum()), bent)
+    pulls = np.zeros((2, len(length))) if pulls is None else np.asarray(pulls, float)
+    return Cells(start, length, *columns, float(length.sum()), bent, pulls)
 
 
 @given(SPEED, SPEED)
@@ -58,18 +60,55 @@ def test_without_acceleration_the_speed_stays():
 )
 def test_border_speeds_can_be_driven(rows):
     length, speed, a = (np.array(column) for column in zip(*rows, strict=True))
+    # Nothing leaves a rest at constant speed.
+    a[[0, -1]] = 0.5
     found = cells(length, speed, a, 10 * a)
-    speeds, forward = border_speeds(found, None, None)
+    speeds, forward = border_speeds(found, 0.0, 0.0)
     assert (speeds <= forward).all()
     needed = change_distance(speeds[:-1], speeds[1:], found.acceleration, found.jerk)
     assert (needed <= found.length * (1 + 1e-9)).all()
     assert (speeds[:-1] <= speed).all()
     assert (speeds[1:] <= speed).all()
-    peaks = peak_speeds(found, speeds)
+    peaks = peak_speeds(found, ends(found, speeds))
     assert (peaks <= speed * (1 + 1e-12)).all()
     there = change_distance(speeds[:-1], peaks, found.acceleration, found.jerk)
     back = change_distance(peaks, speeds[1:], found.acceleration, found.jerk)
     assert (there + back <= found.length * (1 + 1e-9)).all()
+
+
+@given(
+    st.lists(
+        st.tuples(st.floats(1e-3, 0.05), SPEED, st.floats(0, 2e3), st.floats(0, 2e3)), min_size=1, max_size=9
+    )
+)
+def test_straights_between_braked_corners_can_be_driven(rows):
+    """Corners of constant speed between straights that must begin or end with s'' = pull s'²."""
+    length, speed, before, after = (np.array(column) for column in zip(*rows, strict=True))
+    a, j, none = 0.5, 5.0, np.zeros(len(rows))
+    corner = np.full(len(rows), 0.03)
+    # No pull exceeds the straight's acceleration at the speed the corner allows.
+    pulls = np.minimum(np.stack((np.append(0.0, after[:-1]), before)), a / corner**2)
+    pulls[1, -1] = 0.0
+    columns = (length, none + 1e-3), (speed, corner), (none + a, none), (none + j, none)
+    rows = [np.column_stack(pair).ravel()[:-1] for pair in columns]
+    found = cells(*rows, [np.column_stack((pull, none)).ravel()[:-1] for pull in pulls])
+    speeds, forward = border_speeds(found, 0.0, 0.0)
+    both = ends(found, speeds)
+    assert (speeds <= forward * (1 + 1e-12)).all()
+    assert np.array_equal(speeds[1:-1:2], speeds[2::2])
+    assert (speeds[1:-1] > 0.0).all()
+    peaks = peak_speeds(found, both)
+    assert (needed(both, peaks, found) <= found.length * (1 + 1e-9) + 1e-12).all()
+    assert (peaks <= found.speed * (1 + 1e-9)).all()
+    assert (np.maximum(both[0].peak, both[1].peak) <= peaks * (1 + 1e-9)).all()
+    law = time_law(found, speeds)
+    after = np.diff(law.t, append=law.duration)
+    s, v, change, jerk = law.state
+    assert (np.abs(change) <= a * (1 + 1e-6)).all()
+    assert (np.abs(jerk) <= j * (1 + 1e-9)).all()
+    assert (v > -1e-12).all()
+    end = s + after * (v + after * (change / 2 + after * jerk / 6))
+    assert np.abs(end - np.append(s[1:], law.end)).max() < 1e-8
 
 
 def test_given_entry_and_exit_are_kept():

@@ -1,0 +1,255 @@
+"""Cells: stretches of path with one set of bounds on s', s'' and s''' each.
+
+Whatever a time law does inside the bounds of a cell, the nozzle keeps its limits there. A
+straight cell gives the whole of them to s'' and s'''; a bent one keeps a part for turning.
+At the borders of cells s'' = 0, but beside corners that are braked into: so they are as long
+as their bounds are alike.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdhr_host.motion.budget import Bends, shares
+from cdhr_host.motion.limits import MotionLimits
+from cdhr_host.motion.smooth_path import SmoothPath
+from cdhr_host.values import Array, Flags, Ints
+
+LONG_RUN = 4.0
+"""A bend longer than this many half-widths must let the speed change inside it."""
+CELL = 2.0
+"""Length of the shortest cells of a long bend, in half-widths."""
+SIZES = (8, 4, 2)
+"""Numbers of such cells that may become one."""
+ALIKE = 0.85, 0.2
+"""Speeds and shares of cells that may become one are within these parts of each other."""
+MERGE = 0.1
+"""m, cells are merged up to this length, so that a long path has borders to stop at."""
+FREE = 0.6
+"""A bend that leaves this share of the limits to changing speed goes together with its neighbours."""
+SHORT = 0.01
+"""m, straights up to this length go together with such bends."""
+TOUCHING = 1e-12
+"""m, less is rounding."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cells:
+    """K stretches of path in order, each with bounds on ds/dt and its derivatives."""
+
+    start: Array
+    """(K,) m in s"""
+    length: Array
+    """(K,) m in s"""
+    speed: Array
+    """(K,) m/s, greatest s'"""
+    acceleration: Array
+    """(K,) m/s², greatest |s''|; 0 where the speed must stay constant"""
+    jerk: Array
+    """(K,) m/s³, greatest |s'''|; 0 where the speed must stay constant"""
+    settled: float
+    """m in s: cells before it keep their bounds whatever path follows"""
+    bent: Flags
+    """(K,) whether the cell lies in a long bend"""
+    pulls: Array
+    """(2, K) 1/m: at its start s'' is pulls[0] s'², at its end -pulls[1] s'²"""
+
+    def only(self, which: Ints | slice) -> "Cells":
+        """Some of the cells."""
+        return Cells(
+            self.start[which],
+            self.length[which],
+            self.speed[which],
+            self.acceleration[which],
+            self.jerk[which],
+            self.settled,
+            self.bent[which],
+            self.pulls[:, which],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _Stretches:
+    """Pieces of the path between two places, or rows of them, with what bounds the speed there."""
+
+    start: Array
+    """m in s"""
+    length: Array
+    cap: Array
+    """m/s"""
+    spend: Array
+    """share of acceleration and jerk that the air leaves for changing speed"""
+    bends: Bends
+    bent: Flags
+    brake: Array
+    run: Ints
+    """number of the bend or straight"""
+    long: Flags
+    """whether that is a long bend"""
+
+    @property
+    def braked(self) -> Flags:
+        """Whether it is a corner that is braked into."""
+        return np.asarray(self.brake.any(axis=0), dtype=np.bool_)
+
+
+def cells(
+    path: SmoothPath,
+    feed: Array,
+    span: tuple[float, float],
+    limits: MotionLimits,
+    *,
+    share: Array,
+    passed: float,
+    long: tuple[bool, bool],
+) -> Cells:
+    """Cells of a path over a span of s.
+
+    ``feed`` (K,) m/s is the speed wanted on each piece, ``share`` (K,) of acceleration and jerk
+    what the air leaves for changing it; ``long`` says whether a bend at the beginning or the end of
+    the span counts as long in any case: it was begun earlier, or the nozzle rests there. A leg is divided
+    where its length, of which ``passed`` (m) lies before s = 0, is a multiple of a cell's; so it is
+    divided alike whenever it is planned again, and what could be braked from a border still can.
+    """
+    h = limits.half_width
+    pieces = _between(path, (np.minimum(feed, limits.speed), share), span, h, long)
+    rows = _rows(pieces, h, passed)
+    cap = np.minimum(rows.cap, _pushed_speed(rows, limits))
+    speed, share = shares(cap, rows.bends, rows.long, rows.braked, limits)
+    share = np.minimum(share, rows.spend)
+    heads, settled = _alike(rows, speed, share, h, passed)
+    open_end = bool(rows.bent[-1])
+    rows, speed, share = (
+        _merged(rows, heads),
+        np.minimum.reduceat(speed, heads),
+        np.minimum.reduceat(share, heads),
+    )
+    share, last = _levelled(rows, speed, share, passed)
+    heads = _heads(speed, share, *rows.brake, _multiples(rows.start + passed, MERGE))
+    rows, speed, share = _merged(rows, heads), speed[heads], share[heads]
+    a, j = share * limits.acceleration, share * limits.jerk
+    known = min(settled if open_end else span[1], last)
+    return Cells(rows.start, rows.length, speed, a, j, known, rows.long, _pulls(rows.brake))
+
+
+def _pushed_speed(rows: _Stretches, limits: MotionLimits) -> Array:
+    """(K,) m/s: greatest s' in a bend whose slowing down the air can follow with its share.
+
+    A corner turned by theta is cut, so that |q'| falls to cos(theta/2) in its middle: along the path
+    q'' is up to |q''| sin(theta/2). A corner with the usual kernel has sin(theta/2) = |q''| h/2, a
+    wider kernel of its own (h = 2 h0/theta) about the root of |q''| h0/2, which is the greater one.
+    Corners that are braked into keep to the air's share as they are.
+    """
+    bend = rows.bends.second
+    with np.errstate(divide="ignore"):
+        sine = np.sqrt(np.minimum(1.0, bend * limits.half_width / 2.0))
+        found = np.sqrt(rows.spend * limits.acceleration / (bend * sine))
+    return np.where(rows.braked, np.inf, found)
+
+
+def _pulls(brake: Array) -> Array:
+    """(2, K) -> (2, K): what the straights beside corners that are braked into must meet at their ends."""
+    beside = np.stack((np.append(0.0, brake[1, :-1]), np.append(brake[0, 1:], 0.0)))
+    return np.where(brake.any(axis=0), 0.0, beside)
+
+
+def _between(
+    path: SmoothPath,
+    wanted: tuple[Array, Array],
+    span: tuple[float, float],
+    h: float,
+    at_ends: tuple[bool, bool],
+) -> _Stretches:
+    """The pieces of a path that lie in a span of s, cut at its ends; ``wanted`` are speeds and shares."""
+    feed, share = wanted
+    ends = np.append(path.start[1:], path.end)
+    first = span[0] + min(TOUCHING, (span[1] - span[0]) / 2)
+    used = np.flatnonzero((ends > first) & (path.start < span[1]))
+    start = np.maximum(path.start[used], span[0])
+    length = np.minimum(ends[used], span[1]) - start
+    bent, brake = path.bending[used] > 0, path.brake[:, used]
+    braked = np.asarray(brake.any(axis=0), dtype=np.bool_)
+    run = np.cumsum((np.diff(bent, prepend=bent[0]) != 0) | (np.diff(braked, prepend=braked[0]) != 0))
+    heads = np.flatnonzero(np.diff(run, prepend=-1))
+    long = bent & (np.add.reduceat(length, heads)[run] > LONG_RUN * h)
+    long |= bent & ((at_ends[0] & (run == run[0])) | (at_ends[1] & (run == run[-1])))
+    bends = Bends.of(path).only(used)
+    return _Stretches(start, length, feed[used], share[used], bends, bent, brake, run, long & ~braked)
+
+
+def _rows(pieces: _Stretches, h: float, passed: float) -> _Stretches:
+    """Pieces together: a short bend is one, a long one many; straights end where the feed changes,
+    and every MERGE."""
+    bent, place = pieces.bent, pieces.start + passed
+    part = np.where(pieces.long, _multiples(place, CELL * h), 0.0)
+    fed = _numbered(pieces.cap) + _numbered(pieces.spend)
+    stretch = np.where(bent, 0.0, _multiples(place, MERGE))
+    return _merged(pieces, _heads(pieces.run, part, np.where(bent & ~pieces.long, 0, fed), stretch))
+
+
+def _numbered(values: Array) -> Ints:
+    """(K,) number of the row of equal neighbours that each is in."""
+    return np.cumsum(np.diff(values, prepend=values[0]) != 0)
+
+
+def _heads(*columns: Array | Ints | Flags) -> Ints:
+    """First of each row of neighbours that are the same in all columns."""
+    table = np.stack([np.asarray(column, dtype=float) for column in columns])
+    change = (np.diff(table, prepend=table[:, :1] - 1.0) != 0).any(axis=0)
+    return np.flatnonzero(change)
+
+
+def _merged(rows: _Stretches, heads: Ints) -> _Stretches:
+    """Each row of neighbours, from one of ``heads`` to before the next, as one."""
+    return _Stretches(
+        rows.start[heads],
+        np.add.reduceat(rows.length, heads),
+        np.minimum.reduceat(rows.cap, heads),
+        np.minimum.reduceat(rows.spend, heads),
+        rows.bends.largest(heads),
+        rows.bent[heads],
+        rows.brake[:, heads],
+        rows.run[heads],
+        rows.long[heads],
+    )
+
+
+def _alike(rows: _Stretches, speed: Array, share: Array, h: float, passed: float) -> tuple[Ints, float]:
+    """First of each group of cells of a long bend that are alike, and where the last group begins.
+
+    Groups begin at multiples of their size, so that they are the same whenever planned again.
+    """
+    place = _multiples(rows.start + passed, CELL * h)
+    place = np.where(rows.long, place, -1.0 - np.arange(len(place)))
+    label = np.arange(len(place), dtype=float)
+    for size in reversed(SIZES):
+        heads = _heads(rows.run, np.floor(place / size))
+        group = np.repeat(np.arange(len(heads)), np.diff(np.append(heads, len(place))))
+        even = np.minimum.reduceat(speed, heads) >= ALIKE[0] * np.maximum.reduceat(speed, heads)
+        even &= np.minimum.reduceat(share, heads) >= ALIKE[1] * np.maximum.reduceat(share, heads)
+        even &= rows.long[heads] & (
+            np.minimum.reduceat(rows.cap, heads) == np.maximum.reduceat(rows.cap, heads)
+        )
+        label = np.where(even[group], heads[group], label)
+    last = _heads(rows.run, np.floor(place / max(SIZES)))[-1]
+    return _heads(label), float(rows.start[last])
+
+
+def _levelled(rows: _Stretches, speed: Array, share: Array, passed: float) -> tuple[Array, float]:
+    """Shares (K,), the same in rows of bends that take little and the short straights between them.
+
+    And where the last row begins, if it may go on.
+    """
+    free = (share >= FREE) & (rows.bent | (rows.length < SHORT)) & ~_pulls(rows.brake).any(axis=0)
+    heads = _heads(free, speed, _multiples(rows.start + passed, MERGE))
+    count = np.diff(np.append(heads, len(share)))
+    least = np.repeat(np.minimum.reduceat(share, heads), count)
+    bent = np.repeat(np.logical_or.reduceat(rows.bent, heads), count)
+    level = np.where(free & bent, least, share)
+    return level, float(rows.start[heads[-1]]) if free[-1] else np.inf
+
+
+def _multiples(length: Array, cell: float) -> Array:
+    """(K,) m, m -> (K,): whole cells before each length; what rounding has put before a border is on it."""
+    whole: Array = np.floor((length + TOUCHING) / cell)
+    return whole

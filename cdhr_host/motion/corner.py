@@ -1,0 +1,243 @@
+"""How corners are rounded: wide where the nozzle need not slow down, braking where it must.
+
+A corner between directions d0 and d1 is rounded by a kernel (smooth_path), at whose every
+place ds/dt may stay the same. Where that would cost much speed, and both segments leave
+room, the nozzle instead brakes into the corner or accelerates out of it, or both: with u
+the time from the middle, in [-T, T], its jerk is
+
+    p0 d0 + r1 d1 before the middle,   r0 d0 + p1 d1 after it.
+
+The motion along d0 comes to rest, the one along d1 begins to move, and both overlap by 2 T.
+They join straights at the speed V = (3 r + p) T²/2, the same on both sides, with s'' of
+size D = (r + p) T, a way of (7 r + p) T³/6 from the corner. p = -r is the kernel itself,
+without braking. In s = V u these are two cubics like all others of the path, but |q''|
+begins with a part -D0/V² along d0 and ends with D1/V² along d1, which the time law must meet
+with s'' = -D0 and s'' = D1. Slower by any factor, the same holds.
+
+The nozzle is nowhere further from both segments than it is from the corner in the middle,
+T³/6 |r1 d1 - r0 d0|: before, it has moved less along d1, and after, less is left along d0.
+And |v| <= V, for the sum of the two speeds begins and ends there and is less in the middle.
+
+Of the shares p/r in SHARES those are taken with which the nozzle is soonest from the middle of
+one segment in the middle of the next.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdhr_host.values import Array, Ints
+
+SHARES = np.linspace(-1.0, 1.0, 9)
+"""p/r that are compared on each side; the first is the kernel's."""
+FINER = (0.125, 0.04)
+"""Steps of p/r around the best of them, by which it is then made better."""
+APART = 1 - 1e-6
+"""Of the halves of segments, so that between two corners there is always a straight."""
+NEARBY = np.array([0.0, -1.0, 1.0])
+HALVINGS = 12
+"""Of an interval of speeds, to compare times."""
+ROOMY = 2.0
+"""Segments at least this many half-widths long leave room for braking."""
+
+
+@dataclass(frozen=True, slots=True)
+class Allowance:
+    """How fast the corners of a path may be taken."""
+
+    feed: Array
+    """(M,) m/s on each segment"""
+    share: Array
+    """(M,) of acceleration and jerk that may be spent on changing speed there"""
+    acceleration: float
+    """m/s²"""
+    jerk: float
+    """m/s³"""
+
+
+@dataclass(frozen=True, slots=True)
+class Rounding:
+    """The stretches of s in which K corners are rounded."""
+
+    half: Array
+    """(K,) m in s, half of each"""
+    saved: Array
+    """(2, K) m, by which each half is longer than the drawn way it stands for"""
+    brake: Array
+    """(2, K) 1/m, D/V² on each side"""
+    third: Array
+    """(2, 2, K) 1/m²: in half i, q''' is third[i, 0] d0 + third[i, 1] d1"""
+
+
+@dataclass(frozen=True, slots=True)
+class Corners:
+    """K corners of a polyline, and what is around them; rows of pairs are before and after."""
+
+    turn: Array
+    """(K,) length of the change of direction"""
+    room: Array
+    """(2, K) m, halves of the segments"""
+    feed: Array
+    """(2, K) m/s"""
+    limits: Array
+    """(2, K) m/s² and m/s³ that braking corners keep"""
+
+    def only(self, which: Ints) -> "Corners":
+        """Some of them."""
+        return Corners(self.turn[which], self.room[:, which], self.feed[:, which], self.limits[:, which])
+
+
+def roundings(
+    lengths: Array,
+    corner: Ints,
+    turns: tuple[Array, Array],
+    widths: tuple[float, Array],
+    allowed: Allowance | None,
+) -> Rounding:
+    """Roundings of the corners at some points of a polyline with segments of given lengths (M,) m.
+
+    ``turns`` are the directions (K, 3) before and after each corner; ``widths`` the usual kernel's
+    half-width, m, and the greatest of each corner, (K,) m, its distance from the path's end.
+    """
+    h, most = widths
+    turn = np.sqrt(((turns[1] - turns[0]) ** 2).sum(axis=1))
+    half = np.maximum(np.minimum(reaches(lengths, h)[corner], 2 * h / turn), h)
+    half = np.minimum(half, most)
+    none, steep = np.zeros((2, len(half))), 1 / half**2
+    found = Rounding(half, none, none.copy(), np.array([[-steep, steep], [steep, -steep]]))
+    if allowed is not None:
+        share = _beside(allowed.share, corner, 0.0).min(axis=0)
+        limits = np.multiply.outer(np.array([allowed.acceleration, allowed.jerk]), share)
+        around = Corners(
+            turn, _beside(APART * lengths / 2, corner, 0.0), _beside(allowed.feed, corner, 0.0), limits
+        )
+        _brake(found, _worthwhile(half, around, h, allowed), around, h)
+    return found
+
+
+def reaches(lengths: Array, h: float) -> Array:
+    """(M,) m -> (M+1,) m: how far the rounding of a corner at each point may reach along the path."""
+    half = np.concatenate(([0.0], lengths, [0.0])) / 2
+    return np.maximum(np.minimum(half[:-1], half[1:]), h)
+
+
+def _beside(values: Array, corner: Ints, end: float) -> Array:
+    """(M,) -> (2, K): values of the segments before and after each corner; at the ends, ``end``."""
+    padded = np.concatenate(([end], values, [end]))
+    return np.stack((padded[corner], padded[corner + 1]))
+
+
+def _worthwhile(half: Array, around: Corners, h: float, allowed: Allowance) -> Ints:
+    """Corners with room on both sides at which a kernel would hold up a change of speed."""
+    by_jerk = np.cbrt(allowed.jerk * half**2 / around.turn)
+    by_acceleration = np.sqrt(allowed.acceleration * half / around.turn)
+    slow = np.minimum(by_jerk, by_acceleration) < around.feed.max(axis=0)
+    return np.flatnonzero(slow & (around.room.min(axis=0) >= APART * ROOMY * h / 2))
+
+
+@dataclass(frozen=True, slots=True)
+class _Swing:
+    """Ways around corners, one for each pair of shares: arrays (..., K, S) of S pairs."""
+
+    share: Array
+    """(2, K, S) p/r"""
+    r: Array
+    """(2, K, S) m/s³"""
+    duration: Array
+    """(K, S) s, T"""
+
+    @property
+    def speed(self) -> Array:
+        """m/s, V"""
+        found: Array = self.r[0] * (3 + self.share[0]) / 2 * self.duration**2
+        return found
+
+    @property
+    def braking(self) -> Array:
+        """m/s², D"""
+        return self.r * (1 + self.share) * self.duration
+
+    @property
+    def reach(self) -> Array:
+        """m of each segment"""
+        return self.r * (7 + self.share) / 6 * self.duration**3
+
+
+def _swings(around: Corners, share: Array, h: float) -> _Swing:
+    """The widest way around each corner, by shares, that limits, tolerance, room and feeds allow.
+
+    Room and feed are kept for bringing s'' to zero beyond the corner.
+    """
+    a, j = around.limits[:, :, None]
+    cosine = (1 - around.turn**2 / 2)[:, None]
+    r = 1 / (3 + share)
+    p = share * r
+    jerks = (p[i] ** 2 + r[1 - i] ** 2 + 2 * p[i] * r[1 - i] * cosine for i in (0, 1))
+    r = r * (j / np.sqrt(np.maximum(*jerks)))
+    apart = np.sqrt(np.maximum(r[0] ** 2 + r[1] ** 2 - 2 * r[0] * r[1] * cosine, 0.0))
+    v, d = r * (3 + share) / 2, r * (1 + share)
+    way = r * (7 + share) / 6 + v * d / j + d**3 / (3 * j**2)
+    with np.errstate(divide="ignore"):
+        bounds = (
+            np.cbrt(2 * h / apart),
+            a / np.maximum(apart, d.max(axis=0)),
+            np.cbrt(around.room[:, :, None] / way).min(axis=0),
+            np.sqrt(around.feed[:, :, None] / (v + d**2 / (2 * j))).min(axis=0),
+        )
+    return _Swing(share, r, np.minimum.reduce(bounds))
+
+
+def _soonest(around: Corners, h: float) -> _Swing:
+    """The best way around each corner: arrays (2, K) and (K,)."""
+    share = np.stack(np.meshgrid(SHARES, SHARES)).reshape(2, 1, -1)
+    swing = _swings(around, share, h)
+    best = np.argmin(_time(swing, around), axis=1)[:, None]
+    share = share[:, 0, best]
+    for step in FINER:
+        around_it = step * np.stack(np.meshgrid(NEARBY, NEARBY)).reshape(2, 1, -1)
+        near = np.clip(share + around_it, SHARES[0], SHARES[-1])
+        swing = _swings(around, near, h)
+        best = np.argmin(_time(swing, around), axis=1)[:, None]
+        share = np.take_along_axis(near, best[None], axis=2)
+    best_r = np.take_along_axis(swing.r, best[None], axis=2)[:, :, 0]
+    return _Swing(share[:, :, 0], best_r, np.take_along_axis(swing.duration, best, axis=1)[:, 0])
+
+
+def _time(swing: _Swing, around: Corners) -> Array:
+    """(K, S) s: from the middle of one segment to the middle of the next, s'' = 0 in both."""
+    speed, braking, limits = swing.speed, swing.braking, around.limits[:, :, None]
+    j = limits[1]
+    spared = braking / j
+    # The change of speed is part of one that begins with s'' = 0, where j has only just set in.
+    least = speed - braking * spared / 2
+    room = around.room[:, :, None] - swing.reach + (least + braking * spared / 6) * spared
+    low, high = speed + braking * spared / 2, np.broadcast_to(around.feed[:, :, None], braking.shape)
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        fits = (least + middle) / 2 * _change(middle - least, limits) <= room
+        low, high = np.where(fits, middle, low), np.where(fits, high, middle)
+    change = _change(low - least, limits)
+    cruise = np.maximum(room - (least + low) / 2 * change, 0.0) / low
+    return np.asarray((swing.duration + change - spared + cruise).sum(axis=0), dtype=np.float64)
+
+
+def _change(difference: Array, limits: Array) -> Array:
+    """m/s, (m/s², m/s³) -> s, for a change of speed with s'' = 0 at both ends."""
+    a, j = limits
+    peak = np.maximum(np.minimum(a, np.sqrt(j * np.maximum(difference, 0.0))), np.finfo(float).tiny)
+    return np.asarray(difference / peak + peak / j)
+
+
+def _brake(found: Rounding, which: Ints, around: Corners, h: float) -> None:
+    """Replace those kernels that braking is quicker than."""
+    if not len(which):
+        return
+    swing = _soonest(around.only(which), h)
+    braked = (swing.share > -1.0).any(axis=0)
+    which, share, r = which[braked], swing.share[:, braked], swing.r[:, braked]
+    speed, duration = swing.speed[braked], swing.duration[braked]
+    found.half[which] = speed * duration
+    found.saved[:, which] = speed * duration - swing.reach[:, braked]
+    found.brake[:, which] = swing.braking[:, braked] / speed**2
+    third = np.array([[share[0] * r[0], r[1]], [r[0], share[1] * r[1]]])
+    found.third[:, :, which] = third / speed**3
