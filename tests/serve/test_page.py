@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import CHROMIUM, Page, opened
+from clients import ROOT, served
 from doors import Open, with_doors
 
 from cdhr_host.job.surface import JobState
@@ -131,3 +132,26 @@ def test_everything_has_a_name_for_a_screen_reader(tmp_path: Path) -> None:
             assert await page.eval(live) >= 4
 
     with_doors(act, tmp_path)
+
+
+def test_the_page_prints_on_the_simulated_machine(tmp_path: Path) -> None:
+    program = (ROOT / "gcode" / "paper_ring_double.gcode").read_text()
+
+    async def act(url: str) -> None:
+        async with opened(url, tmp_path / "browser") as page:
+            await page.until("by('state').textContent === 'idle'")
+            code = (
+                "const body = new FormData(); body.append('print', 'true');"
+                f"body.append('file', new File([{program!r}], 'ring.gcode'));"
+                "fetch('/server/files/upload', {method: 'POST', body}); 1"
+            )
+            assert await page.eval(code) == 1
+            await page.until("by('state').textContent.startsWith('printing')", 60.0)
+            await page.until("parseFloat(by('percent').textContent) > 20 && seen.air.pressure_kpa > 60", 60.0)
+            assert await page.eval("document.querySelectorAll('#cables li.out').length") == 0
+            await page.until("by('state').textContent.startsWith('done')", 90.0)
+            assert await page.eval("by('percent').textContent") == "100.0 %"
+            assert await page.eval("by('taken').hidden") is False
+
+    with served(tmp_path) as doors:
+        asyncio.run(act(doors["http"]))
