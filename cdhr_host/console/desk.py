@@ -15,7 +15,7 @@ from textual.widgets import Footer, Input, RichLog, Static
 from cdhr_host.console import panels
 from cdhr_host.console.entry import History, WordSuggester, history_file
 from cdhr_host.console.help import HELP
-from cdhr_host.console.jogging import AXES, Jogging
+from cdhr_host.console.jogging import AXES, SLIDERS, Jogging
 from cdhr_host.errors import CdhrError
 from cdhr_host.job.surface import Event, JobState, Reply, Surface
 
@@ -85,6 +85,7 @@ class Desk(App[None]):
         self._jogging = Jogging(surface, self._answered)
         self._unlisten: Callable[[], None] = lambda: None
         self._leaving = False
+        self._choosing = False
         self._prompt = ""
 
     def compose(self) -> ComposeResult:
@@ -122,6 +123,8 @@ class Desk(App[None]):
         """Jog keys and the small ones; typed text has the focus of its own."""
         if self._prompt:
             self._typed_key(event)
+        elif self._choosing:
+            self._choose(event)
         elif event.key in AXES:
             self._try(lambda: self._jogging.press(event.key))
             event.stop()
@@ -205,6 +208,8 @@ class Desk(App[None]):
             "+": lambda: self._jogging.resize(1),
             "-": lambda: self._jogging.resize(-1),
             "c": self._jogging.toggle,
+            "s": self._ask_slider,
+            "escape": lambda: self._jogging.choose(None),
             ":": lambda: self._open_entry(CODE),
             "h": lambda: self.run_code("G28"),
             "[": lambda: self._override(feed=-OVERRIDE_STEP),
@@ -215,6 +220,20 @@ class Desk(App[None]):
             "f9": self._surface.acknowledge,
             "f10": self.action_leave,
         }
+
+    def _ask_slider(self) -> None:
+        """The next key names a slider."""
+        self._jogging.choose(None)
+        self._choosing = True
+        self.say("which slider alone? 1 to 6; any other key: none")
+
+    def _choose(self, event: events.Key) -> None:
+        """A digit after ``s``."""
+        self._choosing = False
+        event.stop()
+        if event.key in SLIDERS:
+            self._jogging.choose(SLIDERS.index(event.key))
+            self.say(f"up, right: slider {event.key} pays out; down, left: takes in; Esc ends this")
 
     def _override(self, *, feed: float = 0.0, flow: float = 0.0) -> None:
         status = self._surface.status()

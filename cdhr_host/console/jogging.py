@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 
+from cdhr_host.errors import JobError, Problem
 from cdhr_host.job.surface import Reply, Surface
 from cdhr_host.units import MM
 from cdhr_host.values import Array
@@ -26,6 +27,9 @@ AXES: Final = {
     "pagedown": (2, -1),
 }
 """key -> axis, direction"""
+SLIDERS: Final = "123456"
+FINE: Final = 2
+"""of the steps, the small ones, may be taken by a single slider"""
 
 
 class Jogging:
@@ -37,10 +41,14 @@ class Jogging:
         self._answered = answered
         self._size = 1
         self.continuous = False
+        self.slider: int | None = None
+        """the one that is moved alone, from 0 on"""
 
     @property
     def label(self) -> str:
         """The present size, for a person."""
+        if self.slider is not None:
+            return f"SLIDER {self.slider + 1} alone: step {STEPS_MM[self._size]:g} mm"
         if self.continuous:
             return f"hold a key: {SPEEDS_MM_S[self._size]:g} mm/s"
         return f"step {STEPS_MM[self._size]:g} mm"
@@ -52,16 +60,30 @@ class Jogging:
     def toggle(self) -> None:
         """Between steps and continuous motion."""
         self.release()
-        self.continuous = not self.continuous
+        self.slider, self.continuous = None, not self.continuous
+
+    def choose(self, slider: int | None) -> None:
+        """One slider for the arrows, from 0 on; None gives them back to the nozzle."""
+        self.release()
+        self.slider, self.continuous = slider, False
 
     def press(self, key: str) -> None:
-        """A jog key was pressed, or repeated itself."""
+        """A jog key was pressed, or repeated itself. Raises JobError for what is refused at once."""
         axis, sign = AXES[key]
-        if self.continuous:
+        if self.slider is not None:
+            self._slide(self.slider, sign)
+        elif self.continuous:
             self._surface.jog(_along(axis, sign * SPEEDS_MM_S[self._size] * MM))
         else:
             step = _along(axis, sign * STEPS_MM[self._size] * MM)
             self._surface.step(step).add_done_callback(self._answered)
+
+    def _slide(self, slider: int, sign: int) -> None:
+        if self._size >= FINE:
+            text = f"a single slider is not moved by {STEPS_MM[self._size]:g} mm at a time"
+            raise JobError(Problem("slider", text, hint="- chooses 1 or 0.1 mm"))
+        answer = self._surface.step_slider(slider, sign * STEPS_MM[self._size] * MM)
+        answer.add_done_callback(self._answered)
 
     def release(self) -> None:
         """End continuous motion now: the key is known to be up, or nobody looks."""

@@ -47,11 +47,11 @@ class Watchdogs:
         self._per_newton = profile.sliders.screw_lead / (2.0 * math.pi * profile.drives.screw_efficiency)
         period = profile.drives.period
         self._period = period
-        self._slack = _Lasting(profile.watch.force_settling, period)
-        self._force = _Lasting(profile.watch.force_settling, period)
-        self._torque = _Lasting(profile.watch.force_settling, period)
-        self._following = _Lasting(profile.watch.following_settling, period)
-        self._pressure = _Lasting(profile.watch.pressure_settling, period)
+        self._slack = Lasting(profile.watch.force_settling, period)
+        self._force = Lasting(profile.watch.force_settling, period)
+        self._torque = Lasting(profile.watch.force_settling, period)
+        self._following = Lasting(profile.watch.following_settling, period)
+        self._pressure = Lasting(profile.watch.pressure_settling, period)
         self._before: Array | None = None
         self._counted = (0.0, 0, 0)
         self._fed = (-math.inf, -1)
@@ -214,7 +214,7 @@ _PRESSURE: Final = _Deviation(
 )
 
 
-class _Lasting:
+class Lasting:
     """Tells a condition once it has lasted, across batches."""
 
     def __init__(self, lasting: float, period: float) -> None:

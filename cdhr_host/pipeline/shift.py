@@ -1,4 +1,4 @@
-"""The upper platform on its way between the reference offset and the policy's, the nozzle standing."""
+"""Motion that no program draws: the upper platform alone, or whatever one slider moves."""
 
 from dataclasses import dataclass
 
@@ -16,10 +16,10 @@ SAME = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Shift:
-    """Ticks at which only the upper platform moves."""
+    """Ticks at which the upper platform moves otherwise than the policy has it."""
 
     track: ToolTrack
-    """the nozzle, standing"""
+    """the nozzle: standing, but where one slider moves it"""
     upper: UpperMotion
 
 
@@ -64,18 +64,30 @@ def played_shift(step: Shift, tick: Ints, beat: Beat, period: float) -> Shift:
     """
     u = np.clip(beat.u - float(step.track.tick[0]), 0.0, len(step.track.tick) - 1.0)
     before = np.minimum(u.astype(np.int64), len(step.track.tick) - 2)
-    place, velocity, acceleration = _quintic(step.upper, before, (u - before)[:, None], period)
     rate, slope = beat.rate[:, None], beat.slope[:, None] / period
-    motion = UpperMotion(place, rate * velocity, rate**2 * acceleration + slope * velocity)
-    return Shift(nozzle_standing_at(step.track, tick), motion)
+
+    def paced(motion: UpperMotion) -> UpperMotion:
+        place, velocity, acceleration = _quintic(motion, before, (u - before)[:, None], period)
+        return UpperMotion(place, rate * velocity, rate**2 * acceleration + slope * velocity)
+
+    track = step.track
+    nozzle = paced(UpperMotion(track.position_G, track.velocity, track.acceleration))
+    return Shift(nozzle_moving(nozzle, tick, int(track.line[0])), paced(step.upper))
 
 
-def _quintic(upper: UpperMotion, k: Ints, z: Array, period: float) -> tuple[Array, Array, Array]:
+def nozzle_moving(motion: UpperMotion, tick: Ints, line: int) -> ToolTrack:
+    """The nozzle (N, 3) m in G, moved without clay."""
+    nothing = np.zeros(len(tick))
+    moved = motion.place, motion.velocity, motion.acceleration
+    return ToolTrack(tick, np.full(len(tick), line), *moved, nothing, nothing.copy())
+
+
+def _quintic(motion: UpperMotion, k: Ints, z: Array, period: float) -> tuple[Array, Array, Array]:
     """Place, velocity and acceleration at the share z (N, 1) of the way from row k (N,) to the next."""
-    c0, c1, c2 = upper.place[k], upper.velocity[k] * period, upper.acceleration[k] * period**2 / 2
-    value = upper.place[k + 1] - c0 - c1 - c2
-    first = upper.velocity[k + 1] * period - c1 - 2 * c2
-    second = upper.acceleration[k + 1] * period**2 - 2 * c2
+    c0, c1, c2 = motion.place[k], motion.velocity[k] * period, motion.acceleration[k] * period**2 / 2
+    value = motion.place[k + 1] - c0 - c1 - c2
+    first = motion.velocity[k + 1] * period - c1 - 2 * c2
+    second = motion.acceleration[k + 1] * period**2 - 2 * c2
     c3 = 10 * value - 4 * first + second / 2
     c4 = -15 * value + 7 * first - second
     c5 = 6 * value - 3 * first + second / 2

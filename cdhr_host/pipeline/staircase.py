@@ -20,7 +20,7 @@ from cdhr_host.pipeline.drying import Layers, lifted, paused
 from cdhr_host.pipeline.leading import Leading
 from cdhr_host.pipeline.pushing import Pushing, lays
 from cdhr_host.pipeline.rig import Rig
-from cdhr_host.pipeline.shift import SAME, Shift, nozzle_standing, shift
+from cdhr_host.pipeline.shift import SAME, Shift, nozzle_moving, nozzle_standing, shift
 from cdhr_host.profile import Profile
 from cdhr_host.program import Interpreter, Modal
 from cdhr_host.values import Array, Command, Moves, Notice, Pause, Setpoints, ToolTrack
@@ -184,6 +184,18 @@ class Staircase:
         if ends and self._at_reference():
             yield from self._shift(np.zeros(3))
 
+    def moved(self, nozzle: UpperMotion, upper: UpperMotion) -> Shift:
+        """Both platforms moved from rest to rest; the machine stands there then.
+
+        ``nozzle``: places (N, 3) m in G; ``upper``: displacements of the upper platform.
+        """
+        standing, ticks = self._planner.standing, self._timeline.reserve(len(nozzle.place))
+        x, y, z = nozzle.place[-1].tolist()
+        self._planner = self._planner.moved_to(nozzle.place[-1])
+        self._interpreter.modal = replace(self._interpreter.modal, position=(x, y, z), onward=None)
+        self._offset = upper.place[-1] - (nozzle.place[-1] - self.rig.cables.reference_G)
+        return Shift(nozzle_moving(nozzle, np.arange(ticks.start, ticks.stop), standing.line), upper)
+
     def fork(self, override: FeedOverride = AS_PROGRAMMED) -> "Staircase":
         """This machine as it is now, to be planned on apart from it, with another feed.
 
@@ -287,9 +299,10 @@ class Staircase:
         return replace(self._audited(kept, q, upper, problems), track=track)
 
     def shifted(self, step: Shift) -> Checked:
-        """As ``checked``, for the upper platform moving alone."""
+        """As ``checked``, for motion of the upper platform that is not the policy's."""
+        problems = self._audit.places(step.track)
         q = step.track.position_G - self.rig.cables.reference_G
-        return self._audited(step.track, q, step.upper, [])
+        return self._audited(step.track, q, step.upper, problems)
 
     def _audited(self, track: ToolTrack, q: Array, upper: UpperMotion, problems: list[Problem]) -> Checked:
         state = self.rig.state(q, track, upper)
