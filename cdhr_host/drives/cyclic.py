@@ -268,22 +268,22 @@ class CyclicLink(BufferedLink):
         if done is not None:
             feedback = self._outcome(done)
             self._executed.append(feedback)
-            found = first_fault(done.row, self._judged(done, feedback), self.profile.drives)
-            if found is not None:
-                self._trip(found[1])
+            self._told_before.append(feedback.setpoint)
+            if first_fault(done.row, feedback, self.profile.drives) is not None:
+                found = first_fault(done.row, self._judged(feedback), self.profile.drives)
+                if found is not None:
+                    self._trip(found[1])
         for finding in self._watched(self._clock.now()):
             self._trip(finding)
 
-    def _judged(self, done: _Sent, feedback: Feedback) -> Feedback:
-        """What the position is compared with: the nearest setpoint it may be the answer to.
+    def _judged(self, feedback: Feedback) -> Feedback:
+        """With the nearest setpoint that the measured position may be the answer to.
 
         An answer may be some cycles old where drives answer every n-th SYNC, and where soft real
         time is allowed.
         """
-        self._told_before.append(self._scaling.slider(done.counts))
-        known = np.array(self._told_before)
-        nearest = np.clip(feedback.slider, known.min(axis=0), known.max(axis=0))
-        return replace(feedback, setpoint=nearest)
+        known = np.concatenate(self._told_before)
+        return replace(feedback, setpoint=np.clip(feedback.slider, known.min(axis=0), known.max(axis=0)))
 
     def _watched(self, now: float) -> Iterator[DriveError]:
         if self.state not in (LinkState.ARMED, *MOVING):
