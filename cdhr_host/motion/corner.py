@@ -128,11 +128,15 @@ def _beside(values: Array, corner: Ints, end: float) -> Array:
 
 
 def _worthwhile(half: Array, around: Corners, h: float, allowed: Allowance) -> Ints:
-    """Corners with room on both sides at which a kernel would hold up a change of speed."""
+    """Corners with room on both sides at which a kernel would hold up a change of speed.
+
+    Not where the air bounds that change: a flow that falls and rises within a corner is the hardest for it.
+    """
     by_jerk = np.cbrt(allowed.jerk * half**2 / around.turn)
     by_acceleration = np.sqrt(allowed.acceleration * half / around.turn)
     slow = np.minimum(by_jerk, by_acceleration) < around.feed.max(axis=0)
-    return np.flatnonzero(slow & (around.room.min(axis=0) >= APART * ROOMY * h / 2))
+    roomy = around.room.min(axis=0) >= APART * ROOMY * h / 2
+    return np.flatnonzero(slow & roomy & (around.limits[0] >= allowed.acceleration))
 
 
 @dataclass(frozen=True, slots=True)
