@@ -136,7 +136,7 @@ def _caps(cells: Cells) -> Array:
     """(K+1,) m/s: what the cells on both sides of a border allow, by themselves."""
     sides = [_below_peak(cells.speed, pull, cells.jerk) for pull in cells.pulls]
     sides = [np.minimum(side, _pulling(pull, cells)) for side, pull in zip(sides, cells.pulls, strict=True)]
-    cap = np.minimum(np.append(sides[0], np.inf), np.concatenate(([np.inf], sides[1])))
+    cap: Array = np.minimum(np.append(sides[0], np.inf), np.concatenate(([np.inf], sides[1])))
     pulled = np.flatnonzero(cells.pulls.any(axis=0))
     if len(pulled):
         some = cells.only(pulled)
@@ -151,7 +151,7 @@ def _caps(cells: Cells) -> Array:
 def _pulling(pull: Array, cells: Cells) -> Array:
     """(K,) m/s: the speed at which s'' at an end is the cell's greatest."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        return np.asarray(np.where(pull > 0.0, np.sqrt(cells.acceleration / pull), np.inf))
+        return np.asarray(np.where(pull > 0.0, np.sqrt(cells.acceleration / pull), np.inf), dtype=np.float64)
 
 
 def _narrowed(cells: Cells) -> tuple[Array, Array]:
