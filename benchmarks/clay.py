@@ -19,11 +19,11 @@ from cdhr_host.units import MM, MM3
 CLAYS = ("earthenware", "porcelain", "stoneware")
 AREA = 11.16
 """mm² of a bead 5 mm wide and 2.5 mm high"""
-SPEED = 20.0
+SPEED = 30.0
 """mm/s"""
 BUFFERED = 125
 """ticks on their way to the drives when a hold is wished"""
-INNER = 5.0 * MM
+INNER = 12.0 * MM
 """m left out at both ends of a bead, so that corners are seen alone"""
 
 

@@ -11,7 +11,8 @@ The dialect is RepRap's as Marlin speaks it, with these choices:
 * G61 and G61.1 are the same, an exact stop at the end of every move; a program starts in G64.
 * Clay never goes back: negative E is a debt that later E pays first; the excess is clay.
 * G4 P is in ms and S in s; G92 never moves the machine's limits; G28 is the machine as a whole.
-* Air words hold a pressure along the moves that follow, whatever the speed; [air] says which.
+* Air words hold a pressure along the moves that follow, whatever the speed, or lay the profile's bead;
+  [air] says which words and what.
 * There is no heater, no second nozzle, no file store, and motors never let go.
 * What is not in the table is refused, and so is a letter that its row does not list.
 """
