@@ -95,16 +95,19 @@ class Changes:
         self._retried(lambda first: self._flowing(first, share))
 
     def _retried(self, change: Callable[[int], None]) -> None:
-        """A change from the first tick on that may still be changed."""
-        for _ in range(TRIES if self._feeder.score is not None else 0):
+        """A change from the first tick on that may still be changed once it is worked out."""
+        ahead, feeder = 0, self._feeder
+        for _ in range(TRIES if feeder.score is not None else 0):
+            begun = feeder.changeable
             try:
-                change(self._feeder.changeable)
+                change(min(begun + ahead, feeder.next_tick))
             except DriveError as error:
                 if error.problems[0].kind != "late-revision":
                     raise
+                ahead = 2 * (feeder.changeable - begun) + 1
             else:
                 return
-        if self._feeder.score is not None:
+        if feeder.score is not None:
             raise JobError(Problem("late", "the link goes on faster than a change can be worked out"))
 
     def _over(self, first: int) -> bool:
