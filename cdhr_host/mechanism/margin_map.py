@@ -15,7 +15,7 @@ RADIUS_STEP: Final = 10.0 * MM
 AZIMUTH_STEP: Final = 2.5 * DEG
 HEIGHT_STEP: Final = 20.0 * MM
 SECTOR: Final = 60.0 * DEG
-"""three cables and their mirror images: the rest of the circle follows by symmetry"""
+"""three cables and their mirror images: the rest of the circle follows by symmetry, as drawn"""
 WORST: Final = -2.0
 """margin told where cables are out of reach or a limit of sliders or pulleys is broken"""
 
@@ -27,7 +27,7 @@ class MarginMap:
     radius: Array
     """(R,) m from the axis"""
     azimuth: Array
-    """(A,) rad, from 0 (cable 1) to 60 degrees"""
+    """(A,) rad, from 0 (cable 1) to 60 degrees; to 360 where the machine differs from its drawing"""
     height: Array
     """(H,) m: displacement along z from the reference pose"""
     margin: Array
@@ -42,7 +42,7 @@ class MarginMap:
         """m³ in which all cables are inside their windows, of every n-th node only."""
         good = self.feasible[::every, ::every, ::every]
         sizes = [_weights(axis[::every]) for axis in (self.radius, self.azimuth, self.height)]
-        around = 2.0 * np.pi / SECTOR
+        around = 2.0 * np.pi / float(self.azimuth[-1])
         rings = self.radius[::every] * sizes[0]
         return float(around * np.einsum("rah,r,a,h->", good, rings, sizes[1], sizes[2]))
 
@@ -59,19 +59,21 @@ class MarginMap:
     def at(self, places: Array) -> Array:
         """(N, 3) m from the reference pose -> (N,): the margin between the nodes, WORST beyond them."""
         x, y, z = places.T
-        points = np.column_stack([np.hypot(x, y), folded(np.arctan2(y, x)), z])
+        points = np.column_stack([np.hypot(x, y), self.folded(np.arctan2(y, x)), z])
         return np.asarray(self.look_up()(points))
+
+    def folded(self, azimuth: Array) -> Array:
+        """rad -> rad in the part that was mapped, where the margin is the same."""
+        span = float(self.azimuth[-1])
+        if span > SECTOR * 1.01:
+            return np.asarray(np.mod(azimuth, span))
+        turn = np.mod(azimuth, 2.0 * span)
+        return np.asarray(np.minimum(turn, 2.0 * span - turn))
 
     def look_up(self) -> RegularGridInterpolator:
         """(N, 3) of radius, folded azimuth and height -> (N,) margins, linear between the nodes."""
         axes = self.radius, self.azimuth, self.height
         return RegularGridInterpolator(axes, self.margin, bounds_error=False, fill_value=WORST)
-
-
-def folded(azimuth: Array) -> Array:
-    """rad -> rad in the sector that has the same margin by symmetry."""
-    turn = np.mod(azimuth, 2.0 * SECTOR)
-    return np.asarray(np.minimum(turn, 2.0 * SECTOR - turn))
 
 
 def margin_map(
@@ -84,7 +86,8 @@ def margin_map(
     anchors, attached = space.cables.anchors, space.cables.attachments
     reach = float(np.linalg.norm(anchors[0, :2]) - np.linalg.norm(attached[0, :2]))
     radius = np.arange(0.0, reach, RADIUS_STEP)
-    azimuth = np.linspace(0.0, SECTOR, round(SECTOR / AZIMUTH_STEP) + 1)
+    span, step = (SECTOR, AZIMUTH_STEP) if space.symmetric else (2.0 * np.pi, 4.0 * AZIMUTH_STEP)
+    azimuth = np.linspace(0.0, span, round(span / step) + 1)
     floor, ceiling = anchors[0, 2] - attached[0, 2], anchors[3, 2] - attached[3, 2]
     height = np.arange(floor + HEIGHT_STEP, ceiling, HEIGHT_STEP)
     margin = np.empty((len(radius), len(azimuth), len(height)))

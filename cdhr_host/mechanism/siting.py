@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from scipy.optimize import minimize
 
-from cdhr_host.mechanism.margin_map import MarginMap, folded, limited_margin
+from cdhr_host.mechanism.margin_map import MarginMap, limited_margin
 from cdhr_host.mechanism.workspace import Workspace
 from cdhr_host.units import MM
 from cdhr_host.values import Array
@@ -97,7 +97,7 @@ def _coarse(
     look_up, least = chart.look_up(), np.empty(len(shifts))
     for k, (dx, dy, dz) in enumerate(shifts):
         x, y, z = places[:, 0] + dx, places[:, 1] + dy, places[:, 2] + dz
-        least[k] = look_up(np.column_stack([np.hypot(x, y), folded(np.arctan2(y, x)), z])).min()
+        least[k] = look_up(np.column_stack([np.hypot(x, y), chart.folded(np.arctan2(y, x)), z])).min()
         told(0.5 * (k + 1) / len(shifts))
     return [shifts[k] for k in np.argsort(-least, kind="stable")[:STARTS]]
 

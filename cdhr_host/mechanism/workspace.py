@@ -17,7 +17,9 @@ from cdhr_host.units import DEG, MM
 from cdhr_host.values import Array, Flags
 
 SECTOR: Final = np.linspace(0.0, 60.0, 13) * DEG
-"""azimuths looked at; the rest of the circle follows by symmetry"""
+"""azimuths looked at; the rest of the circle follows by symmetry, as drawn"""
+AROUND: Final = np.linspace(0.0, 355.0, 72) * DEG
+"""azimuths looked at where a machine differs from its drawing"""
 
 
 class Angles(NamedTuple):
@@ -64,6 +66,11 @@ class Workspace:
             Windows.from_profile(profile),
             Policy.from_profile(profile, policy),
         )
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the machine is as drawn: alike about its axis and mirrored at each cable."""
+        return self.profile.calibration == type(self.profile.calibration)()
 
     def margin(self, lower: Array, acceleration: float = 0.0) -> Array:
         """(N, 3) -> (N,): smallest margin of the nine cables in half-widths of their windows.
@@ -147,7 +154,8 @@ def _radii(space: Workspace, height: Array, step: float, acceleration: float) ->
     anchors, attached = space.cables.anchors, space.cables.attachments
     reach = 0.5 * float(np.linalg.norm(anchors[0, :2]) - np.linalg.norm(attached[0, :2]))
     radii = np.arange(0.0, reach, step)
-    r, turn, z = np.meshgrid(radii, SECTOR, height - attached[0, 2], indexing="ij")
+    turns = SECTOR if space.symmetric else AROUND
+    r, turn, z = np.meshgrid(radii, turns, height - attached[0, 2], indexing="ij")
     places = np.column_stack([(r * np.cos(turn)).ravel(), (r * np.sin(turn)).ravel(), z.ravel()])
     good = space.feasible(places, acceleration).reshape(r.shape).all(axis=1)
     far = np.cumprod(good, axis=0).sum(axis=0) - 1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cdhr_host.mechanism import Workspace
-from cdhr_host.mechanism.margin_map import WORST, MarginMap, folded, limited_margin, margin_map
+from cdhr_host.mechanism.margin_map import WORST, MarginMap, limited_margin, margin_map
 from cdhr_host.mechanism.siting import best_site, sparse
 from cdhr_host.profile import find, read_table, validate
 from cdhr_host.units import DEG
@@ -27,9 +27,9 @@ def around(count: int, seed: int) -> np.ndarray:
     return rng.uniform([-0.3, -0.3, -0.3], [0.3, 0.3, 0.6], size=(count, 3))
 
 
-def test_the_sector_speaks_for_the_whole_circle(space: Workspace) -> None:
+def test_the_sector_speaks_for_the_whole_circle(space: Workspace, chart: MarginMap) -> None:
     places = around(2000, 1)
-    r, turn = np.hypot(places[:, 0], places[:, 1]), folded(np.arctan2(places[:, 1], places[:, 0]))
+    r, turn = np.hypot(places[:, 0], places[:, 1]), chart.folded(np.arctan2(places[:, 1], places[:, 0]))
     mirrored = np.column_stack([r * np.cos(turn), r * np.sin(turn), places[:, 2]])
     assert (turn <= 60.0 * DEG + 1e-12).all()
     assert limited_margin(space, mirrored) == pytest.approx(limited_margin(space, places), abs=1e-9)
@@ -103,3 +103,16 @@ def test_thinning_keeps_the_rim() -> None:
     assert len(some) <= 300
     assert (some.min(axis=0) == places.min(axis=0)).all()
     assert (some.max(axis=0) == places.max(axis=0)).all()
+
+
+def test_a_machine_unlike_its_drawing_is_mapped_all_around(space: Workspace) -> None:
+    shifted = [[20.0, 0.0, 0.0], *[[0.0, 0.0, 0.0]] * 5]
+    found = space.profile.calibration.model_copy(update={"pulley_shift_mm": shifted})
+    askew = Workspace.from_profile(space.profile.model_copy(update={"calibration": found}))
+    assert not askew.symmetric
+    whole = margin_map(askew)
+    assert whole.azimuth[-1] == pytest.approx(2.0 * np.pi)
+    places = around(2000, 4)
+    exact, read = limited_margin(askew, places), whole.at(places)
+    inside = exact > 0.05
+    assert np.quantile(np.abs(read[inside] - exact[inside]), 0.97) < 0.04

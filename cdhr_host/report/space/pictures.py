@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from cdhr_host.mechanism import Workspace
-from cdhr_host.mechanism.margin_map import MarginMap, folded
+from cdhr_host.mechanism.margin_map import MarginMap
 from cdhr_host.report.files import put
 from cdhr_host.report.plot.style import SETTINGS
 from cdhr_host.report.space.sited import Sited
@@ -122,7 +122,7 @@ def _levels(chart: MarginMap, part: Sited | None, reference: float) -> list[int]
 def _slice(axes: "Axes", chart: MarginMap, space: Workspace, part: Sited | None, k: int) -> None:
     reach = min(1.1 * max(float(chart.reach()[:, k].max()), 0.05), float(chart.radius[-1]))
     near = chart.radius <= 1.4 * reach
-    columns = np.searchsorted(chart.azimuth, folded(ROUND) - 1e-9).clip(0, len(chart.azimuth) - 1)
+    columns = np.searchsorted(chart.azimuth, chart.folded(ROUND) - 1e-9).clip(0, len(chart.azimuth) - 1)
     r, turn = np.meshgrid(chart.radius[near], ROUND, indexing="ij")
     _shade(
         axes, r * np.cos(turn) / MM, r * np.sin(turn) / MM, chart.margin[near][:, columns, k], _most(chart)
@@ -143,7 +143,7 @@ def _solid(axes: Any, chart: MarginMap, space: Workspace, part: Sited | None) ->
     """The outer surface by the reach in every direction."""
     reach = chart.reach()
     there = np.flatnonzero(reach.max(axis=0) > 0.0)
-    columns = np.searchsorted(chart.azimuth, folded(ROUND) - 1e-9).clip(0, len(chart.azimuth) - 1)
+    columns = np.searchsorted(chart.azimuth, chart.folded(ROUND) - 1e-9).clip(0, len(chart.azimuth) - 1)
     if there.size:
         radius = reach[columns][:, there]
         turn, z = np.meshgrid(ROUND, _above(space, chart.height[there]), indexing="ij")
