@@ -87,7 +87,11 @@ class Api:
 def running(*command: object, log: Path) -> Iterator[subprocess.Popen[bytes]]:
     with log.open("wb") as out:
         process = subprocess.Popen(
-            [str(each) for each in command], stdout=out, stderr=out, stdin=subprocess.DEVNULL
+            [str(each) for each in command],
+            stdout=out,
+            stderr=out,
+            stdin=subprocess.DEVNULL,
+            env={**os.environ, "XDG_STATE_HOME": str(log.parent / "state")},
         )
         try:
             yield process
