@@ -128,7 +128,7 @@ class Desk(App[None]):
         elif event.key in AXES:
             self._try(lambda: self._jogging.press(event.key))
             event.stop()
-        elif (act := self._small_keys().get(event.character or event.key)) is not None:
+        elif (act := self._small_keys().get(event.character or "", self._named_keys().get(event.key))):
             self._try(act)
             event.stop()
 
@@ -178,6 +178,11 @@ class Desk(App[None]):
             self._try(lambda: self._surface.hold("the console was left"))
             self.say("the print is held; q again leaves it so")
             return
+        self._go()
+
+    def _go(self) -> None:
+        """Leave, and let go of every key."""
+        self._jogging.release()
         self.exit()
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
@@ -209,7 +214,6 @@ class Desk(App[None]):
             "-": lambda: self._jogging.resize(-1),
             "c": self._jogging.toggle,
             "s": self._ask_slider,
-            "escape": lambda: self._jogging.choose(None),
             ":": lambda: self._open_entry(CODE),
             "h": lambda: self.run_code("G28"),
             "[": lambda: self._override(feed=-OVERRIDE_STEP),
@@ -217,6 +221,12 @@ class Desk(App[None]):
             "{": lambda: self._override(flow=-OVERRIDE_STEP),
             "}": lambda: self._override(flow=OVERRIDE_STEP),
             "0": lambda: self._surface.override(feed=1.0, flow=1.0),
+        }
+
+    def _named_keys(self) -> dict[str, Callable[[], None]]:
+        """Name of a key without a character of its own -> what it does."""
+        return {
+            "escape": lambda: self._jogging.choose(None),
             "f9": self._surface.acknowledge,
             "f10": self.action_leave,
         }
@@ -282,7 +292,7 @@ class Desk(App[None]):
 
     def _refresh(self) -> None:
         if self._should_stop():
-            self.exit()
+            self._go()
             return
         status = self._surface.status()
         self._leaving = self._leaving and status.state in MOVING

@@ -1,13 +1,11 @@
 """The desk under an operator's fingers, over a real printer on simulated drives."""
 
-import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
-from textual.pilot import Pilot
-from textual.widgets import RichLog, Static
+from hands import Hands, run
 
 from cdhr_host.console.desk import Desk
 from cdhr_host.drives import Loopback, PacedClock
@@ -19,45 +17,6 @@ from cdhr_host.units import MM
 RING = Path(__file__).parents[2] / "gcode" / "paper_ring_double.gcode"
 SPEED = 10.0
 """times real time: slow enough for a hand to come in between"""
-PATIENCE = 30.0
-"""s until something that should happen is given up"""
-
-
-class Hands:
-    """An operator: a desk, its printer, and what can be read."""
-
-    def __init__(self, pilot: Pilot[None], printer: Printer) -> None:
-        self.pilot = pilot
-        self.printer = printer
-        self.press = pilot.press
-
-    @property
-    def desk(self) -> Desk:
-        assert isinstance(self.pilot.app, Desk)
-        return self.pilot.app
-
-    def text(self, name: str) -> str:
-        return str(self.desk.query_one(f"#{name}", Static).content)
-
-    @property
-    def messages(self) -> str:
-        return "\n".join(strip.text for strip in self.desk.query_one(RichLog).lines)
-
-    async def until(self, happened: Callable[[], bool]) -> None:
-        loop = asyncio.get_running_loop()
-        given_up = loop.time() + PATIENCE
-        while not happened():
-            assert loop.time() < given_up, f"{self.text('job')}\n{self.messages}"
-            await self.pilot.pause(0.02)
-
-    async def type(self, text: str) -> None:
-        await self.press("colon", *text, "enter")
-
-    async def print(self, path: Path) -> None:
-        await self.press("f3", *str(path), "enter")
-        await self.until(lambda: self.printer.state is JobState.READY)
-        await self.press("f5")
-        await self.until(lambda: self.printer.state is JobState.PRINTING)
 
 
 @asynccontextmanager
@@ -76,10 +35,6 @@ async def hands(
     finally:
         printer.close()
         link.close()
-
-
-def run(test: Coroutine[None, None, None]) -> None:
-    asyncio.run(test)
 
 
 def place(hand: Hands) -> list[float]:
