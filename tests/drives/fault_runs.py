@@ -140,6 +140,30 @@ def refusals():
         yield "22 H", case.fault, "a row fed", "refused before the wire", reject(case)
 
 
+STOP = "path-true stop, air off, fault"
+WATCHED = (
+    ("a cable slack, by its force sensor", "slack_force_n", "force_settling_ms", "slack", STOP),
+    ("cable force away from the plan", "force_deviation_n", "force_settling_ms", "force-deviation", STOP),
+    ("motor torque away from the plan", "torque_deviation_nm", "force_settling_ms", "torque-deviation", STOP),
+    (
+        "following error in proportion to speed",
+        "following_floor_mm, following_lag_ms",
+        "following_settling_ms",
+        "following-error",
+        STOP,
+    ),
+    (
+        "pressure away from its command",
+        "pressure_deviation_kpa",
+        "pressure_settling_ms",
+        "pressure-deviation",
+        "hold",
+    ),
+    ("the sender's cycles late too often", "late_share_percent", "10 s", "late", "hold"),
+    ("no new setpoint although the link waits", "feeder_silence_s", "-", "feeder", "hold"),
+    ("the journal's disk nearly full", "disk_free_mb", "-", "disk", "hold"),
+)
+"""what ``job.watchdogs`` looks for"""
 HEADS = ["#", "fault", "injected how", "detected after", "problem", "reaction"]
 PAGE = """# What goes wrong, and what happens then
 
@@ -167,17 +191,7 @@ take it and answer the counter with EMCY 0x8240 (18): noted, and tested (`tests/
 It knows the plan, so it sees what drives cannot. Thresholds are in `[watch]`; each is a test
 (`tests/job/test_watchdogs.py`, `tests/job/test_records.py`), and a stop leaves a black box.
 
-| fault | threshold | lasting | problem | reaction |
-|---|---|---|---|---|
-| a cable slack, by its force sensor | `slack_force_n` | `force_settling_ms` | slack | path-true stop, air off, fault |
-| cable force away from the plan | `force_deviation_n` | `force_settling_ms` | force-deviation | path-true stop, air off, fault |
-| motor torque away from the plan | `torque_deviation_nm` | `force_settling_ms` | torque-deviation | path-true stop, air off, fault |
-| following error in proportion to speed | `following_floor_mm`, `following_lag_ms` | `following_settling_ms` | following-error | path-true stop, air off, fault |
-| pressure away from its command | `pressure_deviation_kpa` | `pressure_settling_ms` | pressure-deviation | hold |
-| the sender's cycles late too often | `late_share_percent` | 10 s | late | hold |
-| no new setpoint although the link waits | `feeder_silence_s` | - | feeder | hold |
-| the journal's disk nearly full | `disk_free_mb` | - | disk | hold |
-
+{watched}
 ## Processes that die
 
 Host, sender and far side as real processes, killed, stopped, kept busy or unplugged (21, 7):
@@ -190,6 +204,7 @@ if __name__ == "__main__":
     text = PAGE.format(
         moving=table(HEADS, moving()),
         bridged=table(HEADS, bridged()),
+        watched=table(["fault", "threshold", "lasting", "problem", "reaction"], WATCHED),
         refusals=table(["#", "fault", "injected how", "reaction", "said"], refusals()),
     )
     target.write_text(text, encoding="utf-8")
