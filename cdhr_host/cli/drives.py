@@ -109,6 +109,7 @@ def reference(*, drives: Url, profile: ProfileName = "paper") -> None:
 @app.command(epilog=examples("cdhr drives home --drives socketcan:can0"))
 def home(*, drives: Url, profile: ProfileName = "paper") -> None:
     """Home every slider in turn, with little torque. The machine moves."""
+    _real(drives)
     machine = open_machine(profile)
     if machine.canopen.reference != "homing":
         raise Refusal(

@@ -29,6 +29,8 @@ COUPLER: Final = 7
 HOST: Final = 127
 SIGNED: Final = (2, 3, 4)
 """data types INTEGER8, 16 and 32, CiA 301"""
+ATTEMPTS: Final = 3
+"""times a bus is scanned on which nobody answers: adapters and nodes may be waking up"""
 SCAN: Final = 0.4
 """s nodes may take to answer a scan, and once more after the last request"""
 
@@ -164,13 +166,20 @@ class Bus:
             return False
 
         self.on_frame = answered
+        for _ in range(ATTEMPTS):
+            self._ask_all()
+            if found:
+                break
+        self.on_frame = lambda _frame: False
+        return sorted(found)
+
+    def _ask_all(self) -> None:
+        """Ask every node id for its device type, and give the answers time."""
         request = struct.pack("<BHB4x", 0x40, 0x1000, 0)
         for first in range(1, 128, 16):
             self.port.send([(0x600 + node, request) for node in range(first, min(first + 16, 128))])
             self.until(lambda: False, SCAN / 8)
         self.until(lambda: False, SCAN)
-        self.on_frame = lambda _frame: False
-        return sorted(found)
 
     def forget_fault(self) -> None:
         """Nothing: every drive keeps its own fault."""
