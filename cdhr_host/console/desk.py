@@ -128,7 +128,7 @@ class Desk(App[None]):
         elif event.key in AXES:
             self._try(lambda: self._jogging.press(event.key))
             event.stop()
-        elif (act := self._small_keys().get(event.character or "", self._named_keys().get(event.key))):
+        elif act := self._small_keys().get(event.character or "", self._named_keys().get(event.key)):
             self._try(act)
             event.stop()
 

@@ -32,12 +32,17 @@ NEXT: Final = {
 
 def positions(status: Status) -> str:
     """Both platforms and the speed."""
-    x, y, z = status.nozzle_G / MM
-    u, v, w = status.upper / MM
+    x, y, z = rounded(status.nozzle_G)
+    u, v, w = rounded(status.upper)
     return (
         f"nozzle X{x:9.3f} Y{y:9.3f} Z{z:9.3f} mm  {status.velocity / MM:6.1f} mm/s\n"
         f"upper  U{u:9.3f} V{v:9.3f} W{w:9.3f} mm  {'referenced' if status.referenced else 'NOT REFERENCED'}"
     )
+
+
+def rounded(place: Array) -> Array:
+    """(3,) m -> (3,) mm to a thousandth, without a minus before zero."""
+    return np.round(place / MM, 3) + 0.0
 
 
 def sliders(status: Status, profile: Profile) -> str:

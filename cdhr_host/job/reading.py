@@ -4,10 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdhr_host.errors import MotionError
 from cdhr_host.job.program import Program
 from cdhr_host.job.surface import JobState, Progress, Status
-from cdhr_host.mechanism import Cables
-from cdhr_host.mechanism.pairs import Pairs, shares
+from cdhr_host.mechanism import Cables, Loads
+from cdhr_host.mechanism.pairs import Pairs, nine_tensions, shares
 from cdhr_host.profile import Profile
 from cdhr_host.values import Array, Feedback, Setpoints
 
@@ -70,6 +71,7 @@ class Reader:
     def __init__(self, profile: Profile) -> None:
         self._period = profile.drives.period
         self._cables, self._pairs = Cables.from_profile(profile), Pairs.from_profile(profile)
+        self._loads = Loads.from_profile(profile)
         forces = profile.forces
         least = [forces.single_min] * 6 + [forces.upper_min] * 3
         greatest = [forces.single_max] * 6 + [forces.upper_max] * 3
@@ -101,7 +103,7 @@ class Reader:
             velocity=self._speed(rows),
             slider=slider if feedback is None else feedback.slider[-1],
             slider_setpoint=slider if rows is None else rows.slider[-1],
-            tension=np.full(9, np.nan) if rows is None else self._nine(rows),
+            tension=self._resting(nozzle, upper) if rows is None else self._nine(rows),
             window=self._window,
             force=np.full(3, np.nan) if feedback is None or not len(feedback.force) else feedback.force[-1],
             torque=np.zeros(6) if feedback is None else feedback.torque[-1],
@@ -121,6 +123,15 @@ class Reader:
         if rows is None or len(rows) < 2:
             return 0.0
         return float(np.linalg.norm(rows.nozzle_G[-1] - rows.nozzle_G[-2]) / self._period)
+
+    def _resting(self, nozzle_G: Array, upper: Array) -> Array:
+        """(9,) N with both platforms standing, before anything has moved; NaN where none hold them."""
+        q = (nozzle_G - self._cables.reference_G)[None]
+        try:
+            nine = nine_tensions(self._cables, self._loads, self._pairs, q, upper[None])[0]
+        except MotionError:
+            return np.full(9, np.nan)
+        return np.concatenate((nine[:6].reshape(2, 3).T.ravel(), nine[6:]))
 
     def _nine(self, rows: Setpoints) -> Array:
         """(9,) N: left and right cable of each pair in turn, then the upper ones."""

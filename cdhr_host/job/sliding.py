@@ -113,7 +113,7 @@ def check_step(axis: int, distance: float) -> None:
 
 
 def _told(axis: int, distance: float, way: Array) -> str:
-    x, y, z = (way / MM + 0.0).tolist()
+    x, y, z = (np.round(way / MM, 3) + 0.0).tolist()
     verb = "pays out" if distance > 0.0 else "takes in"
     return (
         f"slider {axis + 1} {verb} {abs(distance) / MM:g} mm: the nozzle goes X{x:+.3f} Y{y:+.3f} Z{z:+.3f}"

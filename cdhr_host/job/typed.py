@@ -5,6 +5,8 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
 
+import numpy as np
+
 from cdhr_host.errors import CdhrError, MotionError, Problem
 from cdhr_host.job.player import Kind, Player
 from cdhr_host.job.states import QUIET
@@ -73,7 +75,7 @@ class Typed:
         answer.set_result(reply)
 
     def _reply(self) -> Reply:
-        x, y, z = (self._player.staircase.standing_G / MM + 0.0).tolist()
+        x, y, z = (np.round(self._player.staircase.standing_G / MM, 3) + 0.0).tolist()
         text = f"X:{x:.3f} Y:{y:.3f} Z:{z:.3f}"
         if not self._ended:
             return Reply(True, (text,))

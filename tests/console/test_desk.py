@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from hands import Hands, run
+from textual.widgets import Static
 
 from cdhr_host.console.desk import Desk
 from cdhr_host.drives import Loopback, PacedClock
@@ -53,6 +54,12 @@ def scenario(body: Callable[[Hands], Awaitable[None]]) -> Callable[[Path], None]
 
     test.__doc__ = body.__doc__
     return test
+
+
+@scenario
+async def test_forces_are_shown_before_anything_moves(hand: Hands) -> None:
+    assert "1L├··█·······┤  2.41  0.5–10.0" in hand.text("cables")
+    assert " 8.77  5.0–12.0" in hand.text("cables")
 
 
 @scenario
@@ -157,6 +164,9 @@ async def test_a_file_that_cannot_be_printed_says_why(hand: Hands) -> None:
 async def test_the_keys_are_shown_and_hidden(hand: Hands) -> None:
     await hand.press("question_mark")
     assert len(hand.desk.screen_stack) == 2
+    table = hand.desk.screen.query_one(Static).region
+    assert table.right <= 80
+    assert table.bottom <= 24
     await hand.press("right")
     assert len(hand.desk.screen_stack) == 1
     assert place(hand) == [0, 0, 0]

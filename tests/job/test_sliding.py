@@ -45,7 +45,7 @@ def test_the_nozzle_is_where_the_cables_have_it_and_that_is_told(desk):
     here = (status.nozzle_G - cables.reference_G)[None], status.upper[None]
     length = lengths(cables, *here)[0] - cables.reference_lengths
     assert length == pytest.approx(np.array([1.0, 0.1, 0, 0, -1.0, 0]) * MM, abs=1e-10)
-    assert desk.told("message")[0] == ("slider 1 pays out 1 mm: the nozzle goes X-0.757 Y-0.000 Z+0.703")
+    assert desk.told("message")[0] == ("slider 1 pays out 1 mm: the nozzle goes X-0.757 Y+0.000 Z+0.703")
     assert np.linalg.norm(status.upper - here[0][0]) > 0.1 * MM
 
 

@@ -1,0 +1,121 @@
+"""``cdhr jog`` in a real terminal: keys, typed G-code, Ctrl-C, and a terminal that goes away."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from terminal import ROOT, TMUX, Terminal, until
+
+pytestmark = pytest.mark.skipif(TMUX is None, reason="tmux is not installed")
+
+
+@contextmanager
+def far_side(folder: Path) -> Iterator[str]:
+    """``cdhr sim`` in a process of its own; the URL of its drives."""
+    port = folder / "machine"
+    with (folder / "sim.txt").open("w") as out:
+        sim = subprocess.Popen(
+            [
+                sys.executable,
+                "-m",
+                "cdhr_host",
+                "sim",
+                "--link",
+                str(port),
+                "--trace",
+                str(folder / "trace.csv"),
+            ],
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            stdout=out,
+            stderr=subprocess.STDOUT,
+        )
+        try:
+            until(port.exists, (folder / "sim.txt").read_text)
+            yield f"slcan:{port}@1000000"
+        finally:
+            sim.send_signal(signal.SIGINT)
+            sim.wait(30)
+
+
+def alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def driven(terminal: Terminal) -> None:
+    """What an operator does first."""
+    terminal.shows("IDLE", "nozzle X    0.000 Y    0.000 Z    0.000 mm", "step 1 mm")
+    terminal.keys("Right", "Right", "Up", "PPage")
+    terminal.shows("nozzle X    2.000 Y    1.000 Z    1.000 mm", "ok X:2.000 Y:1.000 Z:1.000")
+    terminal.keys("-", "Left")
+    terminal.shows("nozzle X    1.900 Y    1.000 Z    1.000 mm", "step 0.1 mm")
+    terminal.keys(":")
+    terminal.shows("G-code:")
+    terminal.type("G1 X5 Y-3 F1200")
+    terminal.keys("Enter")
+    terminal.shows("nozzle X    5.000 Y   -3.000 Z    1.000 mm", "> G1 X5 Y-3 F1200")
+    terminal.keys("h")
+    terminal.shows("ok X:0.000 Y:0.000 Z:0.000")
+
+
+def test_over_loopback(tmp_path: Path) -> None:
+    with Terminal(tmp_path, ["jog"]) as terminal:
+        driven(terminal)
+        lines = terminal.screen.splitlines()
+        assert len(lines) <= 24
+        assert max(map(len, lines)) <= 80
+        terminal.keys("q")
+        assert terminal.code == 0
+
+
+def test_over_a_serial_adapter(tmp_path: Path) -> None:
+    with far_side(tmp_path) as url, Terminal(tmp_path, ["jog", "--drives", url]) as terminal:
+        driven(terminal)
+        terminal.keys("q")
+        assert terminal.code == 0
+        assert "leaked" not in terminal.screen
+        assert "Traceback" not in terminal.screen
+
+
+def test_ctrl_c_holds_and_stays(tmp_path: Path) -> None:
+    with Terminal(tmp_path, ["jog"]) as terminal:
+        terminal.shows("IDLE")
+        terminal.keys(":")
+        terminal.shows("G-code:")
+        terminal.type("G1 X80 F300")
+        terminal.keys("Enter")
+        terminal.shows("> G1 X80 F300")
+        until(lambda: "nozzle X    0.000" not in terminal.screen, lambda: terminal.screen)
+        terminal.keys("C-c")
+        terminal.shows("stopped on the path: X:")
+        assert "X:80.000" not in terminal.screen
+        assert alive(terminal.process)
+        terminal.keys("q")
+        assert terminal.code == 0
+
+
+def test_a_terminal_that_is_gone_brings_the_machine_to_rest(tmp_path: Path) -> None:
+    with far_side(tmp_path) as url, Terminal(tmp_path, ["jog", "--drives", url]) as terminal:
+        terminal.shows("IDLE", "referenced")
+        terminal.keys(":")
+        terminal.shows("G-code:")
+        terminal.type("G1 X120 F600")
+        terminal.keys("Enter")
+        until(lambda: "nozzle X    0.000" not in terminal.screen, lambda: terminal.screen)
+        process = terminal.process
+        terminal.close()
+        until(lambda: not alive(process), lambda: f"process {process} still runs")
+    places = [line.split(",") for line in (tmp_path / "trace.csv").read_text().splitlines()]
+    assert len(places) > 2
+    assert places[-1][1:7] == places[-20][1:7]
