@@ -83,7 +83,8 @@ class Course:
         self._waiting: deque[tuple[int, Iterator[Checked]]] = deque()
         self.first = staircase.tick
         """the first tick of it"""
-        self._kept_from = self.first
+        self.kept_from = self.first
+        """tick of the plan before which nothing is known any more"""
 
     @property
     def over(self) -> bool:
@@ -174,7 +175,7 @@ class Course:
             self._marks.popleft()
         while self._blocks and int(self._blocks[0].tick[-1]) < before:
             self._blocks.popleft()
-        self._kept_from = max(self._kept_from, before)
+        self.kept_from = max(self.kept_from, before)
         while self._waiting and self._waiting[0][0] <= before:
             self._waiting.popleft()
 
@@ -225,12 +226,12 @@ class Course:
     def _blocks_of(self, step: Timed | Shift) -> Iterator[Checked]:
         """As ``Timed.tracks`` has them, but for those wholly before what is wanted."""
         if isinstance(step, Shift):
-            yield self.staircase.shifted(step)
+            yield self.staircase.afresh().shifted(step)
             return
         for first in range(step.ticks.start, step.ticks.stop, BLOCK):
             last = min(first + BLOCK, step.ticks.stop)
-            if last > self._kept_from:
-                yield self.staircase.checked(step.track(np.arange(first, last)))
+            if last > self.kept_from:
+                yield self.staircase.afresh().checked(step.track(np.arange(first, last)))
 
     def _computed(self) -> Setpoints:
         """The next block of rows."""
