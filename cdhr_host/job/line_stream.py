@@ -21,6 +21,8 @@ from cdhr_host.values import Command, Moves
 
 AHEAD: Final = 3.0
 """s of real time drawn ahead; a client that pauses is obeyed that late"""
+FAR: Final = 6
+"""times as much where what is drawn does not settle: long gentle bends are planned in long pieces"""
 WAITING_MAX: Final = 256
 """short lines not read yet while the plan needs more"""
 WAITING_FULL: Final = 8
@@ -122,12 +124,14 @@ class LineStream:
     def read(self, played: float) -> None:
         """Read lines while less than ``AHEAD`` is drawn beyond ``played``, a tick of the plan."""
         short = self._together > 1
+        thin = self.course.staircase.tick - played < self._settled
+        wanted = self._ahead * (FAR if thin else 1)
         if self.refusal is None and self._waiting and self._now() >= self._next:
             self._next = self._now() + (EVERY if short else 0.0)
-            self._read_until(played + self._ahead)
-        hungry = self.course.ahead - played < self._ahead
+            self._read_until(played + wanted)
+        hungry = self.course.ahead - played < wanted
         self._room = WAITING_MAX if hungry and self._together > 1 else WAITING_FULL
-        if self.course.staircase.tick - played < self._settled and not self.course.rests:
+        if thin and not self.course.rests:
             self._settle()
         self.full = not hungry and self.course.staircase.tick - played < self._settled
 

@@ -101,9 +101,10 @@ class Lines:
         if stream is None:
             return
         beyond = stream.course.staircase.tick - stop.tick
-        if beyond > 0 and (beyond >= self._lead or not stream.patient):
+        waits = stream.patient and not stream.full
+        if beyond > 0 and (beyond >= self._lead or not waits):
             player.go_on()
-        elif not stream.course.rests and not stream.patient:
+        elif not stream.course.rests and not waits:
             stream.course.rest()
         elif stream.drained:
             if stream.over or stream.refusal is not None:

@@ -101,6 +101,19 @@ def test_lines_that_keep_coming_print_without_a_stop_between_them() -> None:
     assert bench.problems() == []
 
 
+def test_a_long_even_bead_has_no_stop_in_it() -> None:
+    bench = Bench()
+    turns = np.arange(0.05, 18.0, 0.05)
+    bench.send(
+        "G1 X40 F1200", *(f"G1 X{40 * np.cos(a):.3f} Y{40 * np.sin(a):.3f} E{40 * a:.3f}" for a in turns)
+    )
+    bench.feed.finish()
+    bench.until(lambda: bench.state is JobState.DONE)
+    speed = np.linalg.norm(np.diff(bench.nozzle(), axis=0), axis=1) / PROFILE.drives.period
+    moving = np.flatnonzero(speed > 1e-4)
+    assert speed[moving[0] + 600 : moving[-1] - 400].min() > 0.01
+
+
 def test_the_way_is_that_of_the_whole_file() -> None:
     bench = Bench()
     bench.send(*ring())
