@@ -8,7 +8,7 @@ import typer
 from cdhr_host.cli.interrupt import StopRequest
 from cdhr_host.cli.machine import SIMULATED, open_machine, opened
 from cdhr_host.cli.options import DrivesUrl, MaterialName, ProfileName, examples
-from cdhr_host.cli.refusals import INTERRUPTED, emit
+from cdhr_host.cli.refusals import INTERRUPTED, Refusal, emit
 
 if TYPE_CHECKING:
     from cdhr_host.job.printer import Printer
@@ -39,17 +39,28 @@ def jog(
     from cdhr_host.job.recorder import Names, Recorder
 
     machine = open_machine(profile, material)
+    has_screen = _has_screen()
     link, clock = opened(drives, machine, speed)
     try:
         printer = Printer(link, clock, recorder=Recorder(link, Names(profile, material, drives)))
         printer.begin()
         try:
-            code = _screen(printer) if sys.stdin.isatty() else _lines(printer)
+            code = _screen(printer) if has_screen else _lines(printer)
         finally:
             printer.close()
     finally:
         link.close()
     raise typer.Exit(code)
+
+
+def _has_screen() -> bool:
+    """Whether a person sits there; raises Refusal where the screen would go into a file."""
+    if sys.stdin.isatty() and not sys.stderr.isatty():
+        raise Refusal(
+            "cdhr: error: the screen is drawn on standard error, which is no terminal\n"
+            "hint: do not redirect it, or pipe lines of G-code in"
+        )
+    return sys.stdin.isatty()
 
 
 def _screen(printer: "Printer") -> int:

@@ -1,6 +1,7 @@
 """``cdhr jog`` with lines from a pipe: answers, exit codes, Ctrl-C."""
 
 import os
+import pty
 import re
 import signal
 import subprocess
@@ -55,6 +56,21 @@ def test_speed_is_for_simulated_drives() -> None:
     done = CliRunner().invoke(app, ["jog", "--speed", "2", "--drives", "slcan:/dev/null@1000000"], input="")
     assert done.exit_code == 2
     assert "--speed is for simulated drives only" in done.stderr
+
+
+def test_a_screen_does_not_go_into_a_file(tmp_path: Path) -> None:
+    terminal, far = pty.openpty()
+    try:
+        command = [sys.executable, "-m", "cdhr_host", "jog"]
+        environment = {**os.environ, "PYTHONPATH": str(ROOT), "XDG_STATE_HOME": str(tmp_path)}
+        done = subprocess.run(
+            command, stdin=far, capture_output=True, encoding="utf-8", env=environment, check=False
+        )
+    finally:
+        os.close(terminal)
+        os.close(far)
+    assert done.returncode == 2
+    assert "which is no terminal\nhint: do not redirect it" in done.stderr
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

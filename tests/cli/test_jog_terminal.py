@@ -119,3 +119,4 @@ def test_a_terminal_that_is_gone_brings_the_machine_to_rest(tmp_path: Path) -> N
     places = [line.split(",") for line in (tmp_path / "trace.csv").read_text().splitlines()]
     assert len(places) > 2
     assert places[-1][1:7] == places[-20][1:7]
+    assert places[-1][1:7] != places[1][1:7]
