@@ -218,9 +218,7 @@ def _tell(fit: "GeometryFit", table: Path) -> None:
     emit("\n".join([f"{table}: the machine, around {fit.profile.machine.name}", *fit_lines(fit)]))
     if fit.found.noise > SUSPICIOUS:
         say(f"doubt: no geometry brings the points nearer than {fit.found.noise / MM:.3g} mm a coordinate")
-        say(
-            "hint: a camera's own frame needs --frame free; sliders are mm paid out from the reference pose"
-        )
+        say("hint: a camera's own frame needs --frame free; sliders are mm paid out from the reference pose")
 
 
 def _asked(fit: "GeometryFit") -> Path | None:
