@@ -190,7 +190,7 @@ def test_a_print_goes_on_at_a_line(tmp_path: Path, program: Program, whole: Setp
 
 def test_a_journal_cut_anywhere_resumes_rightly_or_says_why_not(tmp_path: Path, program: Program) -> None:
     """Never a millimetre skipped, never one laid twice beyond the overlap that is stated."""
-    machine = interrupted(tmp_path, program, 6.1)
+    machine = interrupted(tmp_path, program, 3.4)
     machine.link.open()
     way, slider = Resuming(program, RIG), machine.link.slider
     measured = RIG.standing(slider)[0]
