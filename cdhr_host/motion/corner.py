@@ -97,12 +97,12 @@ def roundings(
     """Roundings of the corners at some points of a polyline with segments of given lengths (M,) m.
 
     ``turns`` are the directions (K, 3) before and after each corner; ``widths`` the usual kernel's
-    half-width, m, and the greatest of each corner, (K,) m, its distance from the path's end.
+    half-width, m, and each corner's distance (K,) m from the path's end, half of which is left for the stop.
     """
     h, most = widths
     turn = np.sqrt(((turns[1] - turns[0]) ** 2).sum(axis=1))
     half = np.maximum(np.minimum(reaches(lengths, h)[corner], 2 * h / turn), h)
-    half = np.minimum(half, most)
+    half = np.minimum(half, most / 2)
     none, steep = np.zeros((2, len(half))), 1 / half**2
     found = Rounding(half, none, none.copy(), np.array([[-steep, steep], [steep, -steep]]))
     if allowed is not None:

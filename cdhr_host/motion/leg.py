@@ -22,6 +22,8 @@ from cdhr_host.motion.time_law import TimeLaw, time_law
 from cdhr_host.units import MM
 from cdhr_host.values import Array, Flags, Ints
 
+SHAPED = 3.0
+"""half-widths from a path's end in which corners are rounded less, to leave room for the stop"""
 BATCH = 2048
 """Segments collected before a plan is made."""
 MORE_ROOM = 0.5
@@ -150,7 +152,8 @@ class LegPlanner:
         allowed = self._allowed(segments)
         path = smooth(segments.points, h, passed=self._passed, closes=closes, allowed=allowed)
         self._planned = len(segments)
-        known = path.end if closes else path.end - max(h, norms(np.diff(segments.points[-2:], axis=0))[0] / 2)
+        last = float(norms(np.diff(segments.points[-2:], axis=0))[0])
+        known = path.end if closes else path.end - max(SHAPED * h, last / 2)
         span = (self._first, float(known))
         if span[1] <= span[0]:
             return None

@@ -215,3 +215,15 @@ def test_position_does_not_jump_where_a_leg_is_planned_in_parts(run, limits):
     assert acceleration <= limits.acceleration * 1.001
     assert jerk <= limits.jerk * 1.001
     assert np.allclose(track.position_G[-1], points[-1], atol=1e-11)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_no_bend_is_crept_through_where_it_ends_at_rest(seed, run):
+    """Its rounding ends at the path's end but for rounding errors, which must not count as a straight."""
+    rng = np.random.default_rng(seed)
+    for _ in range(25):
+        start = np.round(rng.uniform(-60, 60, 3), 3)
+        long, short = np.round(rng.uniform(-9, 9, (2, 3)), 3)
+        points = np.cumsum([start, long, 0.07 * short], axis=0) * 1e-3
+        track = run([moves(points, speed=0.1)], start=points[0])
+        assert len(track.tick) * PERIOD < 1.6

@@ -28,7 +28,7 @@ def zigzag():
 def test_is_the_convolution_with_a_triangle(zigzag):
     path = smooth(zigzag, H, passed=0.0, closes=True)
     drawn = np.linalg.norm(np.diff(zigzag, axis=0), axis=1).sum()
-    places = np.linspace(2 * H, drawn - 2 * H, 57)
+    places = np.linspace(3 * H, drawn - 3 * H, 57)
     _, position, _, _ = path.at(places)
     wanted = np.array([convolved(zigzag, s) for s in places])
     assert np.abs(position - wanted).max() < 1e-10
@@ -77,7 +77,7 @@ def test_middle_of_a_longer_path_does_not_depend_on_what_was_cut_off(zigzag):
     cut = 12
     offset = lengths[:cut].sum()
     part = smooth(zigzag[cut:], H)
-    places = np.linspace(offset + H, lengths.sum() - 2 * H, 300)
+    places = np.linspace(offset + H, lengths.sum() - 3 * H, 300)
     for wanted, found in zip(whole.at(places)[1:], part.at(places - offset)[1:], strict=True):
         assert np.abs(wanted - found).max() < 1e-8
 
