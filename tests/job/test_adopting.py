@@ -44,7 +44,7 @@ def settled(printer: Printer, clock: Stepped, answer: "Future[Reply]") -> Reply:
         printer.turn()
         if answer.done():
             return answer.result()
-        clock.wait_until(clock.now() + 0.1)
+        clock.wait_until(clock.now() + 0.02)
     raise AssertionError(printer.status())
 
 
