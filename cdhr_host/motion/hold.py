@@ -36,8 +36,8 @@ STARTS: Final = 8
 """moments tried at which the ramp begins"""
 SLACK: Final = 1.01
 """excess over a limit that counts as keeping it"""
-STANDSTILL: Final = 2.5e-4
-"""m/s below which a slider stands: a micrometre a tick, and what stretch gives way in the last one"""
+STANDSTILL: Final = 1e-4
+"""m/s below which a slider stands"""
 
 
 def rows_needed(profile: Profile) -> int:

@@ -104,10 +104,15 @@ class Timed:
 
 
 class Timeline:
-    """Lays stretches one after the other, on ticks of one period."""
+    """Lays stretches one after the other, on ticks of one period.
 
-    def __init__(self, period: float, shaper: Shaper = UNSHAPED) -> None:
+    A ``rest`` stands for ``still`` ticks more: sliders that follow a cable's stretch give way to the
+    forces of the last moving tick.
+    """
+
+    def __init__(self, period: float, shaper: Shaper = UNSHAPED, *, still: int = 0) -> None:
         self.period = period
+        self._still = still
         self.shaper = shaper
         self._laid: tuple[Laid, ...] = ()
         self._time = 0.0
@@ -133,7 +138,7 @@ class Timeline:
         """Stand until the first tick at which nothing moves any more; the next stretch begins there."""
         laid = self._add(stand)
         still = self._time + self.shaper.length
-        last = max(math.ceil(still / self.period - EARLY), self._tick)
+        last = max(math.ceil(still / self.period - EARLY), self._tick) + self._still
         self._time = last * self.period
         return self._timed(laid, last + 1)
 

@@ -31,8 +31,6 @@ from cdhr_host.values import Array, Flags, Ints
 
 STRAIGHT = 1e-9
 """Direction changes below this (rad) are no corners."""
-SLIVER = 1e-13
-"""m: a piece shorter than this is rounding, and must not come between a bend and the path's end"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +197,7 @@ def _knots(
     none = np.zeros((len(also), 3))
     order = np.argsort(at, kind="stable")
     at = np.clip(at[order], also[-1], last)
-    keep = np.diff(at, append=last) > SLIVER
+    keep = np.diff(at, append=last) > 0
     one = np.ones(len(half))
     active = np.cumsum(np.concatenate((one, 0 * one, -one, none[:, 0]))[order])
     third = np.cumsum(np.concatenate((first, second - first, -second, none))[order], axis=0)

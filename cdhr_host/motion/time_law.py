@@ -9,9 +9,10 @@ from cdhr_host.motion.look_ahead import ends, peak_speeds
 from cdhr_host.motion.speed_change import speed_change
 from cdhr_host.values import Array
 
-INSIDE = 1e-12
-"""m, by how much s keeps off the borders of its cell: s'' may jump there, and q'' with it, so that
-rounding must not pair a law with the path beyond. More than rounding on a long leg."""
+INSIDE = 32 * float(np.finfo(np.float64).eps)
+"""By how much of a leg's length s keeps off the borders of its cell: s'' may jump there, and q'' with it,
+so that rounding must not pair a law with the path beyond. More than rounding, and no more than needed:
+the nozzle waits there for so long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +101,7 @@ def _integrated(
     end = np.cumsum(duration)
     lasting = duration.ravel() > 0
     start = np.concatenate(([0.0], end[:-1]))[lasting]
-    within = np.stack((np.append(begin[0], begin[1:] + INSIDE), np.append(begin[1:] - INSIDE, last)))
+    inside = INSIDE * max(abs(float(begin[0])), abs(last))
+    within = np.stack((np.append(begin[0], begin[1:] + inside), np.append(begin[1:] - inside, last)))
     within = within.repeat(7, axis=1)
     return TimeLaw(start, float(end[-1]), last, state.reshape(4, -1)[:, lasting], within[:, lasting])

@@ -41,7 +41,7 @@ class Staircase:
         self._period = profile.drives.period if rate_hz is None else 1.0 / rate_hz
         self._limits = self.rig.limits()
         self._audit = Audit(profile)
-        self._timeline = Timeline(self._period, profile_shaper(self.profile))
+        self._timeline = self._new_timeline()
         self._planner = Planner(self._limits, self.rig.cables.reference_G)
         self._interpreter = Interpreter(profile, at_G=self.rig.cables.reference_G)
         self._offset = np.zeros(3)
@@ -59,6 +59,9 @@ class Staircase:
         """Lines, limits and cables of the current text that were told as problems."""
         return self._audit.total
 
+    def _new_timeline(self) -> Timeline:
+        return Timeline(self._period, profile_shaper(self.profile), still=0 if self.rig.give is None else 1)
+
     @property
     def modal(self) -> Modal:
         """What the next line inherits from those read so far."""
@@ -70,10 +73,7 @@ class Staircase:
         ``upper`` (3,) m is the upper platform's displacement, if it is not where it belongs.
         """
         x, y, z = at_G.tolist()
-        self._planner, self._timeline = (
-            self._planner.moved_to(at_G),
-            Timeline(self._period, profile_shaper(self.profile)),
-        )
+        self._planner, self._timeline = self._planner.moved_to(at_G), self._new_timeline()
         self._interpreter.modal = replace(self._interpreter.modal, position=(x, y, z), onward=None)
         self._offset = self._wanted() if upper is None else upper - (at_G - self.rig.cables.reference_G)
 

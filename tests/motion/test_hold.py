@@ -214,6 +214,6 @@ def test_too_few_rows_give_the_gentlest_stop_there_is(count):
 
 def test_rest_is_slow_not_only_equal():
     slow, fast = np.zeros((2, 6)), np.zeros((2, 6))
-    slow[1], fast[1] = 2.4e-4 * PERIOD, 2.6e-4 * PERIOD
+    slow[1], fast[1] = 0.9e-4 * PERIOD, 1.1e-4 * PERIOD
     assert ends_at_rest(slow, PAPER)
     assert not ends_at_rest(fast, PAPER)
