@@ -26,19 +26,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdhr_host.values import Array, Ints
+from cdhr_host.motion.room import APART
+from cdhr_host.values import Array, Flags, Ints
 
 SHARES = np.linspace(-1.0, 1.0, 9)
 """p/r that are compared on each side; the first is the kernel's."""
 FINER = (0.125, 0.04)
 """Steps of p/r around the best of them, by which it is then made better."""
-APART = 1 - 1e-6
-"""Of the halves of segments, so that between two corners there is always a straight."""
 NEARBY = np.array([0.0, -1.0, 1.0])
 HALVINGS = 12
 """Of an interval of speeds, to compare times."""
-ROOMY = 2.0
-"""Segments at least this many half-widths long leave room for braking."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,49 +73,52 @@ class Corners:
     turn: Array
     """(K,) length of the change of direction"""
     room: Array
-    """(2, K) m, halves of the segments"""
+    """(2, K) m, of the straights beside it"""
     feed: Array
     """(2, K) m/s"""
     limits: Array
     """(2, K) m/s² and m/s³ that braking corners keep"""
+    width: Array
+    """(K,) m, three times the distance by which each may be cut"""
 
     def only(self, which: Ints) -> "Corners":
         """Some of them."""
-        return Corners(self.turn[which], self.room[:, which], self.feed[:, which], self.limits[:, which])
+        room, feed, limits = self.room[:, which], self.feed[:, which], self.limits[:, which]
+        return Corners(self.turn[which], room, feed, limits, self.width[which])
+
+
+@dataclass(frozen=True, slots=True)
+class Widths:
+    """What the tolerance, and the ends of the path, allow the kernels of K corners."""
+
+    usual: float
+    """m, half-width of the kernels that span several corners"""
+    own: Array
+    """(K,) m, the same for a corner that stands alone; less where the way to it was drawn straight"""
+    ends: Array
+    """(K,) m to the path's nearest end; half of it is left for the stop"""
 
 
 def roundings(
-    lengths: Array,
-    corner: Ints,
-    turns: tuple[Array, Array],
-    widths: tuple[float, Array],
-    allowed: Allowance | None,
+    room: Array, corner: Ints, turns: tuple[Array, Array], widths: Widths, allowed: Allowance | None
 ) -> Rounding:
-    """Roundings of the corners at some points of a polyline with segments of given lengths (M,) m.
+    """Roundings of the corners at some points of a polyline with ``room`` (2, K) m before and after them.
 
-    ``turns`` are the directions (K, 3) before and after each corner; ``widths`` the usual kernel's
-    half-width, m, and each corner's distance (K,) m from the path's end, half of which is left for the stop.
+    ``turns`` are the directions (K, 3) before and after each corner.
     """
-    h, most = widths
-    turn = np.sqrt(((turns[1] - turns[0]) ** 2).sum(axis=1))
-    half = np.maximum(np.minimum(reaches(lengths, h)[corner], 2 * h / turn), h)
-    half = np.minimum(half, most / 2)
+    h, turn = widths.usual, np.sqrt(((turns[1] - turns[0]) ** 2).sum(axis=1))
+    reach = room.min(axis=0)
+    alone = reach >= APART * h
+    half = np.where(alone, np.minimum(reach, 2 * widths.own / turn), h)
+    half = np.minimum(half, widths.ends / 2)
     none, steep = np.zeros((2, len(half))), 1 / half**2
     found = Rounding(half, none, none.copy(), np.array([[-steep, steep], [steep, -steep]]))
     if allowed is not None:
         share = _beside(allowed.share, corner, 0.0).min(axis=0)
         limits = np.multiply.outer(np.array([allowed.acceleration, allowed.jerk]), share)
-        around = Corners(
-            turn, _beside(APART * lengths / 2, corner, 0.0), _beside(allowed.feed, corner, 0.0), limits
-        )
-        _brake(found, _worthwhile(half, around, h, allowed), around, h)
+        around = Corners(turn, room, _beside(allowed.feed, corner, 0.0), limits, widths.own)
+        _brake(found, _worthwhile(half, around, alone, allowed), around)
     return found
-
-
-def reaches(lengths: Array, h: float) -> Array:
-    """(M,) m -> (M+1,) m: how far the rounding of a corner at each point may reach along the path."""
-    half = np.concatenate(([0.0], lengths, [0.0])) / 2
-    return np.maximum(np.minimum(half[:-1], half[1:]), h)
 
 
 def _beside(values: Array, corner: Ints, end: float) -> Array:
@@ -127,7 +127,7 @@ def _beside(values: Array, corner: Ints, end: float) -> Array:
     return np.stack((padded[corner], padded[corner + 1]))
 
 
-def _worthwhile(half: Array, around: Corners, h: float, allowed: Allowance) -> Ints:
+def _worthwhile(half: Array, around: Corners, alone: Flags, allowed: Allowance) -> Ints:
     """Corners with room on both sides at which a kernel would hold up a change of speed.
 
     Not where the air bounds that change: a flow that falls and rises within a corner is the hardest for it.
@@ -135,8 +135,7 @@ def _worthwhile(half: Array, around: Corners, h: float, allowed: Allowance) -> I
     by_jerk = np.cbrt(allowed.jerk * half**2 / around.turn)
     by_acceleration = np.sqrt(allowed.acceleration * half / around.turn)
     slow = np.minimum(by_jerk, by_acceleration) < around.feed.max(axis=0)
-    roomy = around.room.min(axis=0) >= APART * ROOMY * h / 2
-    return np.flatnonzero(slow & roomy & (around.limits[0] >= allowed.acceleration))
+    return np.flatnonzero(slow & alone & (around.limits[0] >= allowed.acceleration))
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,7 +166,7 @@ class _Swing:
         return self.r * (7 + self.share) / 6 * self.duration**3
 
 
-def _swings(around: Corners, share: Array, h: float) -> _Swing:
+def _swings(around: Corners, share: Array) -> _Swing:
     """The widest way around each corner, by shares, that limits, tolerance, room and feeds allow.
 
     Room and feed are kept for bringing s'' to zero beyond the corner.
@@ -183,7 +182,7 @@ def _swings(around: Corners, share: Array, h: float) -> _Swing:
     way = r * (7 + share) / 6 + v * d / j + d**3 / (3 * j**2)
     with np.errstate(divide="ignore"):
         bounds = (
-            np.cbrt(2 * h / apart),
+            np.cbrt(2 * around.width[:, None] / apart),
             a / np.maximum(apart, d.max(axis=0)),
             np.cbrt(around.room[:, :, None] / way).min(axis=0),
             np.sqrt(around.feed[:, :, None] / (v + d**2 / (2 * j))).min(axis=0),
@@ -191,16 +190,16 @@ def _swings(around: Corners, share: Array, h: float) -> _Swing:
     return _Swing(share, r, np.minimum.reduce(bounds))
 
 
-def _soonest(around: Corners, h: float) -> _Swing:
+def _soonest(around: Corners) -> _Swing:
     """The best way around each corner: arrays (2, K) and (K,)."""
     share = np.stack(np.meshgrid(SHARES, SHARES)).reshape(2, 1, -1)
-    swing = _swings(around, share, h)
+    swing = _swings(around, share)
     best = np.argmin(_time(swing, around), axis=1)[:, None]
     share = share[:, 0, best]
     for step in FINER:
         around_it = step * np.stack(np.meshgrid(NEARBY, NEARBY)).reshape(2, 1, -1)
         near = np.clip(share + around_it, SHARES[0], SHARES[-1])
-        swing = _swings(around, near, h)
+        swing = _swings(around, near)
         best = np.argmin(_time(swing, around), axis=1)[:, None]
         share = np.take_along_axis(near, best[None], axis=2)
     best_r = np.take_along_axis(swing.r, best[None], axis=2)[:, :, 0]
@@ -232,11 +231,11 @@ def _change(difference: Array, limits: Array) -> Array:
     return np.asarray(difference / peak + peak / j)
 
 
-def _brake(found: Rounding, which: Ints, around: Corners, h: float) -> None:
+def _brake(found: Rounding, which: Ints, around: Corners) -> None:
     """Replace those kernels that braking is quicker than."""
     if not len(which):
         return
-    swing = _soonest(around.only(which), h)
+    swing = _soonest(around.only(which))
     braked = (swing.share > -1.0).any(axis=0)
     which, share, r = which[braked], swing.share[:, braked], swing.r[:, braked]
     speed, duration = swing.speed[braked], swing.duration[braked]

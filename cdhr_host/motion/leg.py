@@ -7,13 +7,15 @@ depend on when segments arrived.
 """
 
 import copy
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.motion.cells import Cells, cells
-from cdhr_host.motion.corner import Allowance, reaches
+from cdhr_host.motion.approach import reach, straightened
+from cdhr_host.motion.corner import Allowance
 from cdhr_host.motion.flow import FlowLimits
 from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.look_ahead import border_speeds
@@ -22,8 +24,6 @@ from cdhr_host.motion.time_law import TimeLaw, time_law
 from cdhr_host.units import MM
 from cdhr_host.values import Array, Flags, Ints
 
-SHAPED = 3.0
-"""half-widths from a path's end in which corners are rounded less, to leave room for the stop"""
 BATCH = 2048
 """Segments collected before a plan is made."""
 MORE_ROOM = 0.5
@@ -106,6 +106,20 @@ class Leg:
         return self.law.duration
 
 
+@dataclass(frozen=True, slots=True)
+class _Begin:
+    """Where a leg goes on that is committed so far."""
+
+    point: int = 0
+    """the drawn point before it, of those that are not forgotten"""
+    onwards: float = 0.0
+    """m in s after the place of that point"""
+    passed: float = 0.0
+    """m in s since the leg's start"""
+    dropped: float = 0.0
+    """m, drawn, that are forgotten"""
+
+
 class LegPlanner:
     """Collects the segments of one leg and commits what is settled."""
 
@@ -115,10 +129,9 @@ class LegPlanner:
         self._override = override
         self._segments: Segments | None = None
         self._planned = 0
-        self._first = 0.0
+        self._begin = _Begin()
         self._entry = 0.0
         self._inside = False
-        self._passed = 0.0
 
     def add(self, segments: Segments) -> None:
         """Draw on; the segments begin where the last ones ended."""
@@ -148,13 +161,12 @@ class LegPlanner:
         segments = self._segments
         if segments is None:
             return None
-        h = self._limits.half_width
-        allowed = self._allowed(segments)
-        path = smooth(segments.points, h, passed=self._passed, closes=closes, allowed=allowed)
         self._planned = len(segments)
-        last = float(norms(np.diff(segments.points[-2:], axis=0))[0])
-        known = path.end if closes else path.end - max(SHAPED * h, last / 2)
-        span = (self._first, float(known))
+        path, segments = self._path(segments, closes=closes)
+        known = path.end if closes else self._known(path, segments)
+        first = float(path.drawn[self._begin.point] + self._begin.onwards)
+        passed = self._begin.passed - first
+        span = (first, known)
         if span[1] <= span[0]:
             return None
         feed, share = self._paces(segments)
@@ -164,8 +176,8 @@ class LegPlanner:
             span,
             self._limits,
             share=share[path.segment],
-            passed=self._passed,
-            long=(self._inside or self._first + self._passed == 0.0, closes),
+            passed=passed,
+            long=(self._inside or self._begin.passed == 0.0, closes),
         )
         speeds, forward = border_speeds(found, self._entry, 0.0)
         self._check_entry(speeds[0])
@@ -173,10 +185,43 @@ class LegPlanner:
         if count == 0:
             return None
         law = time_law(found.only(slice(count)), speeds[: count + 1])
-        leg = Leg(path, law, segments, self._number, self._passed)
+        leg = Leg(path, law, segments, self._number, passed)
         if not closes:
-            self._advance(path, found, count, float(speeds[count]))
+            self._advance(path, found, count, passed)
+            self._entry = float(speeds[count])
         return leg
+
+    def _path(self, segments: Segments, *, closes: bool) -> tuple[SmoothPath, Segments]:
+        """The smoothed path of what is not forgotten, and the segments as it follows them."""
+        h, dropped = self._limits.half_width, self._begin.dropped
+        points, spent = straightened(segments.points, segments.feed, h)
+        path = smooth(
+            points,
+            h,
+            passed=dropped,
+            closes=closes,
+            allowed=self._allowed(segments),
+            spent=spent,
+            most=self._room(),
+        )
+        return path, replace(segments, points=points)
+
+    def _room(self) -> float:
+        """m, way from the greatest speed to rest: no corner needs more."""
+        v, a, j = self._limits.speed, self._limits.acceleration, self._limits.jerk
+        return v * max(v / a + a / j, 2 * math.sqrt(v / j)) / 2
+
+    def _reach(self) -> float:
+        """m of path drawn before and after each place on which the path there depends."""
+        return reach(self._limits.half_width) + 2 * self._room()
+
+    def _known(self, path: SmoothPath, segments: Segments) -> float:
+        """m in s up to which no further drawing changes the path."""
+        drawn = np.concatenate(([0.0], np.cumsum(norms(np.diff(segments.points, axis=0)))))
+        point = int(np.searchsorted(drawn, drawn[-1] - self._reach(), side="right")) - 1
+        if point < 0:
+            return -math.inf
+        return float(path.drawn[point] + max(drawn[-1] - self._reach() - drawn[point], 0.0))
 
     def _allowed(self, segments: Segments) -> Allowance:
         """As programmed, so that the path is the same with any feed."""
@@ -190,20 +235,19 @@ class LegPlanner:
         feed = segments.wanted(self._override, limits.flow)
         return feed, limits.flow.share(feed, segments.clay, limits.acceleration)
 
-    def _advance(self, path: SmoothPath, found: Cells, count: int, speed: float) -> None:
-        """Forget what is committed, but for the path the kernel still reaches back to."""
-        segments = self._segments
+    def _advance(self, path: SmoothPath, found: Cells, count: int, passed: float) -> None:
+        """Forget what is committed, but for the path on which what follows depends."""
+        segments, begin = self._segments, self._begin
         assert segments is not None
         border = float(found.start[count])
-        drawn = path.drawn
-        lengths = norms(np.diff(segments.points, axis=0))
-        over = np.maximum.accumulate(drawn + reaches(lengths, self._limits.half_width))
-        first = max(int(np.searchsorted(over, border, side="right")) - 1, 0)
+        drawn = np.concatenate(([0.0], np.cumsum(norms(np.diff(segments.points, axis=0)))))
+        point = int(np.searchsorted(path.drawn, border, side="right")) - 1
+        first = int(np.searchsorted(drawn, drawn[point] - self._reach(), side="right")) - 1
+        first = max(first, 0)
         self._segments = segments.part(first, len(segments))
         self._planned = len(self._segments)
-        self._first = border - drawn[first]
-        self._passed += float(drawn[first])
-        self._entry = speed
+        onwards, dropped = border - float(path.drawn[point]), begin.dropped + float(drawn[first])
+        self._begin = _Begin(point - first, onwards, border + passed, dropped)
         self._inside = bool(found.bent[count])
 
     def _check_entry(self, speed: float) -> None:

@@ -26,7 +26,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdhr_host.motion.corner import Allowance, Rounding, roundings
+from cdhr_host.motion.corner import Allowance, Rounding, Widths, roundings
+from cdhr_host.motion.room import norms as norms
+from cdhr_host.motion.room import rooms
 from cdhr_host.values import Array, Flags, Ints
 
 STRAIGHT = 1e-9
@@ -104,6 +106,8 @@ def smooth(
     passed: float = math.inf,
     closes: bool = False,
     allowed: Allowance | None = None,
+    spent: Array | None = None,
+    most: float = math.inf,
 ) -> SmoothPath:
     """(M+1, 3) m: the smoothed path of a polyline with M segments of positive length.
 
@@ -118,7 +122,9 @@ def smooth(
     direction = steps / lengths[:, None]
     corner, turns = _corners(direction)
     ends = np.minimum(passed + drawn[corner], drawn[-1] - drawn[corner] if closes else math.inf)
-    rounding = roundings(lengths, corner, turns, (h, ends), allowed)
+    own = h - 3.0 * (np.zeros(len(points)) if spent is None else spent)[corner]
+    room = rooms(drawn, corner, norms(turns[1] - turns[0]), _changes(allowed, len(points)), h, most)
+    rounding = roundings(room, corner, turns, Widths(h, own, ends), allowed)
     saved = np.zeros((2, len(points)))
     saved[:, corner] = rounding.saved
     after = drawn + np.cumsum(saved.sum(axis=0))
@@ -139,6 +145,14 @@ def smooth(
     value = _anchored(value, onwards, straight)
     coefficients = np.stack([np.ascontiguousarray(rows.T) for rows in (value, slope, second, third)])
     return SmoothPath(knots, float(last), coefficients, segment, kinks.bending, kinks.brake, after)
+
+
+def _changes(allowed: Allowance | None, count: int) -> Flags:
+    """(M+1,) points at which another feed begins."""
+    found = np.zeros(count, dtype=np.bool_)
+    if allowed is not None:
+        found[1:-1] = (np.diff(allowed.feed) != 0.0) | (np.diff(allowed.share) != 0.0)
+    return found
 
 
 def _dot(a: Array, b: Array) -> Array:
@@ -216,9 +230,3 @@ def _knots(
 def _before(increments: Array) -> Array:
     """Running sum of all earlier rows."""
     return np.concatenate((np.zeros((1, increments.shape[1])), np.cumsum(increments, axis=0)[:-1]))
-
-
-def norms(vectors: Array) -> Array:
-    """(N, 3) -> (N,): lengths of vectors."""
-    lengths: Array = np.sqrt(np.einsum("nk,nk->n", vectors, vectors))
-    return lengths

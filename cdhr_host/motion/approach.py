@@ -1,0 +1,185 @@
+"""Straight ways to sharp corners: what a slicer draws beside them as chords, drawn straight.
+
+A nozzle brakes before a sharp corner and accelerates after it, which it does best on a straight
+(``motion.corner``). So points up to REACH half-widths from such a corner are moved
+onto the chord to the last of them where none is further than SPENT half-widths from it. Two
+sharp corners nearer together than that twice become one.
+
+No point moves further than SPENT half-widths, so no place between two of them does, and the
+corners themselves round by so much less.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cdhr_host.motion.room import norms
+from cdhr_host.values import Array, Flags, Ints
+
+SHARP = 0.35
+"""Change of direction from which a corner needs a straight, about 20°."""
+REACH = 6.0
+"""half-widths, the longest straight made"""
+SPENT = 1 / 9
+"""half-widths, how far a point may move: a third of the tolerance"""
+TRIES = (1.0, 0.7, 0.5)
+"""Of REACH, lengths that are tried."""
+CALM = 1.0
+"""Turns that may lie within two half-widths beyond a straight's end: kernels overlap there, and
+are a sixth of the turns between them times the half-width off."""
+ONWARDS = 0.5
+"""Least cosine between a moved segment and its straight."""
+LEAST = 2.5
+"""half-widths, the shortest straight made."""
+SPECK = 0.01
+"""Of two corners' distance, what is left of it when they become one."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Drawn:
+    """A polyline as it was drawn; K sharp corners."""
+
+    points: Array
+    """(M+1, 3) m"""
+    along: Array
+    """(M+1,) m"""
+    turn: Array
+    """(M+1,) change of direction, 0 at both ends"""
+    sharp: Ints
+    """(K,) points"""
+
+    @classmethod
+    def of(cls, points: Array) -> "_Drawn":
+        """A polyline."""
+        steps = np.diff(points, axis=0)
+        length = norms(steps)
+        turn = np.zeros(len(points))
+        turn[1:-1] = norms(np.diff(steps / length[:, None], axis=0))
+        along = np.concatenate(([0.0], np.cumsum(length)))
+        return cls(points, along, turn, np.flatnonzero(turn > SHARP))
+
+    def reversed(self) -> "_Drawn":
+        """The same from its end."""
+        last = len(self.turn) - 1
+        along = self.along[-1] - self.along[::-1]
+        return _Drawn(self.points[::-1], along, self.turn[::-1], last - self.sharp[::-1])
+
+
+def straightened(points: Array, feed: Array, h: float) -> tuple[Array, Array]:
+    """(M+1, 3) m, (M,) m/s -> points as they are to be driven, and (M+1,) m by how much what lies around
+    each was moved.
+    """
+    spent = np.zeros(len(points))
+    drawn = _Drawn.of(points)
+    if len(points) < 3 or not len(drawn.sharp):
+        return points, spent
+    drawn = _Drawn.of(_paired(drawn, feed, h, spent))
+    whole, first, last = _joining(drawn, h)
+    forth, back = _onwards(drawn, whole, h), _onwards(drawn.reversed(), whole[::-1], h)
+    end = len(points) - 1
+    first = np.concatenate((first, forth[0], end - back[1]))
+    last = np.concatenate((last, forth[1], end - back[0]))
+    return _moved(drawn, first, last, spent), spent
+
+
+def reach(h: float) -> float:
+    """m of path, to each side, on which the place of a point depends."""
+    return (3 * REACH + 4) * h
+
+
+def _paired(drawn: _Drawn, feed: Array, h: float, spent: Array) -> Array:
+    """(M+1, 3) m: pairs of sharp corners that stand alone but for each other become one between them."""
+    points, length = drawn.points, np.diff(drawn.along)
+    inner = drawn.sharp[(drawn.sharp > 0) & (drawn.sharp < len(length) - 1)]
+    pair = inner[(drawn.turn[inner + 1] > SHARP) & (length[inner] <= 2 * SPENT * h)]
+    pair = pair[np.minimum(length[pair - 1], length[pair + 1]) >= 2 * h]
+    before, after = feed[pair] == feed[pair - 1], feed[pair] == feed[pair + 1]
+    pair, before = pair[before | after], before[before | after][:, None]
+    if not len(pair):
+        return points
+    middle = (points[pair] + points[pair + 1]) / 2
+    speck = SPECK * length[pair, None]
+    paired = points.copy()
+    paired[pair] = middle - np.where(before, speck * _units(middle - points[pair - 1]), 0.0)
+    paired[pair + 1] = middle + np.where(before, 0.0, speck * _units(points[pair + 2] - middle))
+    spent[pair] = spent[pair + 1] = (0.5 + SPECK) * length[pair]
+    return paired
+
+
+def _joining(drawn: _Drawn, h: float) -> tuple[Flags, Ints, Ints]:
+    """Which gaps between sharp corners (K-1,) become one straight, and the points on both sides of those."""
+    first, last = drawn.sharp[:-1], drawn.sharp[1:]
+    whole = (last - first > 1) & (drawn.along[last] - drawn.along[first] <= 2 * REACH * h)
+    whole[whole] = _fits(drawn, first[whole], last[whole], h)
+    return whole, first[whole], last[whole]
+
+
+def _onwards(drawn: _Drawn, whole: Flags, h: float) -> tuple[Ints, Ints]:
+    """First and last point of each straight to be made after a sharp corner."""
+    along, sharp = drawn.along, drawn.sharp
+    apart = np.diff(along[sharp], append=np.inf)
+    undone = ~np.append(whole, False) & (sharp < len(along) - 2)
+    first, apart = sharp[undone], apart[undone]
+    last, found = first.copy(), np.zeros(len(first), dtype=np.bool_)
+    for part in TRIES:
+        most = along[first] + np.minimum(part * REACH * h, apart / 2)
+        end = np.searchsorted(along, most, "right") - 1
+        usable = ~found & (end > first + 1) & (end < len(along) - 1)
+        usable[usable] = _calm(drawn, first[usable], end[usable], h)
+        usable[usable] = _fits(drawn, first[usable], end[usable], h)
+        last[usable], found = end[usable], found | usable
+    return first[found], last[found]
+
+
+def _calm(drawn: _Drawn, first: Ints, last: Ints, h: float) -> Flags:
+    """Whether the straight is long enough, and what follows gentle enough, for its corner to stand alone."""
+    turned = np.concatenate(([0.0], np.cumsum(drawn.turn)))
+    beyond = np.searchsorted(drawn.along, drawn.along[last] + 2 * h, "right")
+    gentle = turned[beyond] - turned[first + 1] <= CALM
+    return np.asarray(gentle & (drawn.along[last] - drawn.along[first] >= LEAST * h), dtype=np.bool_)
+
+
+def _off(drawn: _Drawn, first: Ints, last: Ints) -> tuple[Ints, Array, Ints]:
+    """Points after ``first`` up to ``last`` of each row, where they go, and where each row begins."""
+    count = last - first
+    heads = np.cumsum(count) - count
+    row = np.repeat(np.arange(len(first)), count)
+    point = first[row] + 1 + np.arange(len(row)) - heads[row]
+    start = drawn.points[first]
+    unit = _units(drawn.points[last] - start)
+    onwards = np.einsum("nk,nk->n", drawn.points[point] - start[row], unit[row])
+    return point, start[row] + onwards[:, None] * unit[row], heads
+
+
+def _fits(drawn: _Drawn, first: Ints, last: Ints, h: float) -> Flags:
+    """Whether what lies between is near enough to the chord, and runs along it."""
+    if not len(first):
+        return np.zeros(0, dtype=np.bool_)
+    point, target, heads = _off(drawn, first, last)
+    off = norms(target - drawn.points[point])
+    row = np.repeat(np.arange(len(first)), last - first)
+    ahead = _units(drawn.points[point] - drawn.points[point - 1])
+    unit = _units(drawn.points[last] - drawn.points[first])[row]
+    along = np.minimum.reduceat(np.einsum("nk,nk->n", ahead, unit), heads) >= ONWARDS
+    return np.asarray(along & (np.maximum.reduceat(off, heads) <= SPENT * h), dtype=np.bool_)
+
+
+def _moved(drawn: _Drawn, first: Ints, last: Ints, spent: Array) -> Array:
+    """(M+1, 3) m: what lies between on the chord."""
+    if not len(first):
+        return drawn.points
+    point, target, heads = _off(drawn, first, last)
+    moved = drawn.points.copy()
+    off = norms(target - drawn.points[point])
+    inner = np.ones(len(point), dtype=np.bool_)
+    inner[np.append(heads[1:], len(point)) - 1] = False
+    moved[point[inner]] = target[inner]
+    for side in (first, last):
+        np.maximum.at(spent, side, np.maximum.reduceat(off, heads))
+    return moved
+
+
+def _units(vectors: Array) -> Array:
+    """(N, 3) -> (N, 3); 0 stays 0."""
+    length = np.maximum(norms(vectors), np.finfo(float).tiny)
+    return np.asarray(vectors / length[:, None], dtype=np.float64)
