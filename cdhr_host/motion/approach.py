@@ -20,9 +20,9 @@ SHARP = 0.35
 """Change of direction from which a corner needs a straight, about 20°."""
 REACH = 6.0
 """half-widths, the longest straight made"""
-SPENT = 1 / 9
-"""half-widths, how far a point may move: a third of the tolerance"""
-TRIES = (1.0, 0.7, 0.5)
+SPENT = 1 / 5
+"""half-widths, how far a point may move: three fifths of the tolerance"""
+TRIES = (1.0, 0.8, 0.65, 0.5, 0.4)
 """Of REACH, lengths that are tried."""
 CALM = 1.0
 """Turns that may lie within two half-widths beyond a straight's end: kernels overlap there, and

@@ -240,7 +240,7 @@ def _levelled(rows: _Stretches, speed: Array, share: Array, passed: float) -> tu
 
     And where the last row begins, if it may go on.
     """
-    free = (share >= FREE) & (rows.bent | (rows.length < SHORT)) & ~_pulls(rows.brake).any(axis=0)
+    free = (share >= FREE) & (rows.bent | (rows.length < SHORT)) & ~rows.braked
     heads = _heads(free, speed, _multiples(rows.start + passed, MERGE))
     count = np.diff(np.append(heads, len(share)))
     least = np.repeat(np.minimum.reduceat(share, heads), count)
