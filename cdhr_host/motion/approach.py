@@ -16,8 +16,8 @@ import numpy as np
 from cdhr_host.motion.room import norms
 from cdhr_host.values import Array, Flags, Ints
 
-SHARP = 0.35
-"""Change of direction from which a corner needs a straight, about 20°."""
+SHARP = 0.25
+"""Change of direction from which a corner needs a straight, about 14°."""
 REACH = 6.0
 """half-widths, the longest straight made"""
 SPENT = 1 / 5
