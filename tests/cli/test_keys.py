@@ -25,7 +25,7 @@ class Printer:
     def override(self, *, feed: float) -> None:
         self.words.append(f"feed {feed}")
 
-    def hold(self, reason: str) -> None:  # noqa: ARG002 - as a printer has it
+    def hold(self, reason: str) -> None:
         self.words.append("hold")
         self.state = JobState.HELD
 
