@@ -37,6 +37,8 @@ SWITCH: Final = 1e-4
 """s after which the thread that works out a stop gives way to the cycle"""
 CAPACITY: Final = 1024
 """setpoints in the ring, besides those in the sender's own buffer"""
+REVISION: Final = 4 * CAPACITY
+"""setpoints of a revision at most: all in the ring and in the sender's own buffer, at any rate of ticks"""
 RESULTS: Final = 16384
 IDLE: Final = 0.05
 """s between two looks for commands while there is no cycle"""
@@ -108,7 +110,7 @@ class Sender:
         self._commands = commands
         self._rows = Ring(width(SETPOINTS, Setpoints), CAPACITY, spec.rows)
         self._results = Ring(width(FEEDBACK, Feedback), RESULTS, spec.results)
-        self._revisions = Ring(width(SETPOINTS, Setpoints), CAPACITY, spec.revisions)
+        self._revisions = Ring(width(SETPOINTS, Setpoints), REVISION, spec.revisions)
         self._memory = SharedMemory(spec.status)
         self._status = np.ndarray((len(Word),), np.int64, self._memory.buf)
         clock = MonotonicClock()
@@ -198,7 +200,7 @@ class Sender:
         Nothing else reads or writes the rows meanwhile and no cycle runs: the next one sees
         either all of the revision or, when it is refused, nothing of it.
         """
-        revised = setpoints(self._revisions.take(CAPACITY))
+        revised = setpoints(self._revisions.take(REVISION))
         self._take_rows()
         first = int(revised.tick[0])
         kept = max(first - self._link.next_tick, 0)
