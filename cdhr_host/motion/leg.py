@@ -57,6 +57,8 @@ class Segments:
     """(M,) m³ for each metre of path"""
     air: Array
     """(M,) Pa held by air words"""
+    room: Array
+    """(M,) share of the acceleration that the cables leave"""
 
     def __len__(self) -> int:
         return len(self.line)
@@ -75,6 +77,7 @@ class Segments:
             self.feed[first:last],
             self.clay[first:last],
             self.air[first:last],
+            self.room[first:last],
         )
 
     def joined(self, other: "Segments") -> "Segments":
@@ -85,7 +88,17 @@ class Segments:
             np.concatenate((self.feed, other.feed)),
             np.concatenate((self.clay, other.clay)),
             np.concatenate((self.air, other.air)),
+            np.concatenate((self.room, other.room)),
         )
+
+    def divided(self, count: Ints, room: Array) -> "Segments":
+        """Each in (M,) equal parts in a row, with the room (sum(M),) of these."""
+        whole = np.repeat(np.arange(len(self)), count)
+        part = np.arange(len(whole)) - (np.cumsum(count) - count)[whole]
+        start, way = self.points[:-1], np.diff(self.points, axis=0)
+        begins = start[whole] + (part / count[whole])[:, None] * way[whole]
+        points = np.concatenate((begins, self.points[-1:]))
+        return Segments(points, self.line[whole], self.feed[whole], self.clay[whole], self.air[whole], room)
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +176,7 @@ class LegPlanner:
             feed[path.segment],
             span,
             self._limits,
-            share=share[path.segment],
+            share=(share[path.segment], segments.room[path.segment]),
             passed=self._passed,
             long=(self._inside or self._first + self._passed == 0.0, closes),
         )
@@ -182,7 +195,7 @@ class LegPlanner:
         """As programmed, so that the path is the same with any feed."""
         limits = self._limits
         share = limits.flow.share(segments.feed, segments.clay, limits.acceleration)
-        return Allowance(segments.feed, share, limits.acceleration, limits.jerk)
+        return Allowance(segments.feed, np.minimum(share, segments.room), limits.acceleration, limits.jerk)
 
     def _paces(self, segments: Segments) -> tuple[Array, Array]:
         """(M,) m/s wanted, (M,) share of acceleration and jerk that the air leaves for changing it."""
