@@ -34,7 +34,8 @@ class Swings:
         ends = np.hstack((self.rest - windows.low, windows.high - self.rest))
         held = ends / np.hstack((self.gain, self.gain))
         upper = np.tile(np.repeat([False, True], [9, 3]), 2)
-        return np.where(upper, (held - bounds.bend * speed**2) / bounds.slope, held)
+        followed = (held - bounds.bend * speed**2) / bounds.slope
+        return np.asarray(np.where(upper, followed, held), dtype=np.float64)
 
 
 def swings(cables: Cables, loads: Loads, pairs: Pairs, lower: Array, upper: Array) -> Swings:
