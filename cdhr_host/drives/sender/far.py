@@ -8,6 +8,7 @@ gives way every SWITCH.
 import ctypes
 import gc
 import os
+import select
 import signal
 import sys
 from dataclasses import dataclass
@@ -40,6 +41,8 @@ CAPACITY: Final = 1024
 REVISION: Final = 4 * CAPACITY
 """setpoints of a revision at most: all in the ring and in the sender's own buffer, at any rate of ticks"""
 RESULTS: Final = 16384
+BATCH: Final = 16
+"""rows moved from the ring at a time while cycles run: one check for all of them"""
 IDLE: Final = 0.05
 """s between two looks for commands while there is no cycle"""
 JITTER: Final = 0.5
@@ -76,9 +79,10 @@ class Spec:
 
 
 def run(spec: Spec, commands: Connection) -> None:
-    """The process's main function; ends when the link was closed or the host is gone."""
+    """The process's main function; ends when the link was closed, the host is gone, or by SIGTERM."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sender = Sender(spec, commands)
+    signal.signal(signal.SIGTERM, lambda _number, _frame: sender.leave())
     real_time = hurry()
     try:
         sender.loop(real_time)
@@ -108,6 +112,8 @@ class Sender:
     def __init__(self, spec: Spec, commands: Connection) -> None:
         self._profile = spec.profile
         self._commands = commands
+        self._asked = select.poll()
+        self._asked.register(commands.fileno(), select.POLLIN)
         self._rows = Ring(width(SETPOINTS, Setpoints), CAPACITY, spec.rows)
         self._results = Ring(width(FEEDBACK, Feedback), RESULTS, spec.results)
         self._revisions = Ring(width(SETPOINTS, Setpoints), REVISION, spec.revisions)
@@ -130,6 +136,10 @@ class Sender:
                 self._move()
             self._publish()
 
+    def leave(self) -> None:
+        """End after this cycle: what moves is stopped on its path first."""
+        self._alive = False
+
     def end(self) -> None:
         """Whatever happened: at rest, voltage off, memory given back."""
         try:
@@ -146,7 +156,7 @@ class Sender:
     def _obey(self, patience: float) -> None:
         """Do what the host asks; a host that is gone asks for the end."""
         try:
-            if not self._commands.poll(patience):
+            if not self._asked.poll(patience * 1e3):
                 return
             name, *arguments = self._commands.recv()
         except (EOFError, OSError):
@@ -170,6 +180,9 @@ class Sender:
     def _abandoned(self) -> None:
         self._take_rows()
         self._alive = False
+
+    def _do_ready(self) -> None:
+        """All the shared memory is open."""
 
     def _do_open(self) -> list[str]:
         self._link.open()
@@ -240,7 +253,8 @@ class Sender:
     def _move(self) -> None:
         """Rows in, results out; a fault goes to the host once."""
         try:
-            self._take_rows()
+            if self._link.free >= BATCH:
+                self._take_rows()
             executed = self._link.feedback()
         except DriveError as error:
             self._say("fault", error.problems)
