@@ -23,7 +23,7 @@ class Swings:
 
     def by(self, nozzle: float, upper: float) -> Array:
         """(N, 12) N: the most that accelerations of the two platforms, m/s², add or take."""
-        return self.gain * np.repeat([nozzle, upper], [9, 3])
+        return np.asarray(self.gain * np.repeat([nozzle, upper], [9, 3]), dtype=np.float64)
 
     def room(self, windows: Windows, bounds: UpperBounds, speed: float) -> Array:
         """(N, 24) m/s²: the nozzle's acceleration that may bring each force to the low, then the high end.

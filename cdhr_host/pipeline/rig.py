@@ -113,8 +113,10 @@ class Rig:
 
     def slider_places(self, track: ToolTrack) -> Array:
         """(N, 6) m: as ``sliders``, with no more worked out than that needs."""
-        _, upper = self.follow(track)
-        return self.shifted_sliders(track, upper)
+        if self.give is not None:
+            return self.shifted_sliders(track, self.follow(track)[1])
+        q = track.position_G - self.cables.reference_G
+        return slider(self.cables, lengths(self.cables, q, self.policy.upper(q)))
 
     def shifted_sliders(self, track: ToolTrack, upper: UpperMotion) -> Array:
         """The same for an upper platform with a motion of its own."""
