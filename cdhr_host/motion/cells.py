@@ -25,6 +25,8 @@ ALIKE = 0.85, 0.2
 """Speeds and shares of cells that may become one are within these parts of each other."""
 MERGE = 0.1
 """m, cells are merged up to this length, so that a long path has borders to stop at."""
+LASTING = 1.0
+"""s, and up to what is passed in this time, so that a slow one has them as often."""
 FREE = 0.6
 """A bend that leaves this share of the limits to changing speed goes together with its neighbours."""
 SHORT = 0.01
@@ -128,7 +130,7 @@ def cells(
         np.minimum.reduceat(spent, heads),
     )
     spent, last = _levelled(rows, speed, spent, passed)
-    heads = _heads(speed, spent, *rows.brake, _multiples(rows.start + passed, MERGE))
+    heads = _heads(speed, spent, *rows.brake, _multiples(rows.start + passed, _longest(speed)))
     rows, speed, spent = _merged(rows, heads), speed[heads], spent[heads]
     a, j = spent * limits.acceleration, spent * limits.jerk
     known = min(settled if open_end else span[1], last)
@@ -184,11 +186,11 @@ def _between(
 
 def _rows(pieces: _Stretches, h: float, passed: float) -> _Stretches:
     """Pieces together: a short bend is one, a long one many; straights end where the feed changes,
-    and every MERGE."""
+    and every MERGE or LASTING."""
     bent, place = pieces.bent, pieces.start + passed
     part = np.where(pieces.long, _multiples(place, CELL * h), 0.0)
     fed = _numbered(pieces.cap) + _numbered(pieces.spend) + _numbered(pieces.room)
-    stretch = np.where(bent, 0.0, _multiples(place, MERGE))
+    stretch = np.where(bent, 0.0, _multiples(place, _longest(pieces.cap)))
     return _merged(pieces, _heads(pieces.run, part, np.where(bent & ~pieces.long, 0, fed), stretch))
 
 
@@ -228,16 +230,17 @@ def _alike(rows: _Stretches, speed: Array, share: Array, h: float, passed: float
     place = _multiples(rows.start + passed, CELL * h)
     place = np.where(rows.long, place, -1.0 - np.arange(len(place)))
     label = np.arange(len(place), dtype=float)
+    most = np.maximum(_longest(rows.cap) / (CELL * h), 1.0)
     for size in reversed(SIZES):
         heads = _heads(rows.run, np.floor(place / size))
         group = np.repeat(np.arange(len(heads)), np.diff(np.append(heads, len(place))))
         even = np.minimum.reduceat(speed, heads) >= ALIKE[0] * np.maximum.reduceat(speed, heads)
         even &= np.minimum.reduceat(share, heads) >= ALIKE[1] * np.maximum.reduceat(share, heads)
-        even &= rows.long[heads] & (
-            np.minimum.reduceat(rows.cap, heads) == np.maximum.reduceat(rows.cap, heads)
-        )
+        even &= rows.long[heads] & (size <= most[heads])
+        even &= np.minimum.reduceat(rows.cap, heads) == np.maximum.reduceat(rows.cap, heads)
         label = np.where(even[group], heads[group], label)
-    last = _heads(rows.run, np.floor(place / max(SIZES)))[-1]
+    greatest = max((size for size in SIZES if size <= most[-1]), default=1)
+    last = _heads(rows.run, np.floor(place / greatest))[-1]
     return _heads(label), float(rows.start[last])
 
 
@@ -247,7 +250,7 @@ def _levelled(rows: _Stretches, speed: Array, share: Array, passed: float) -> tu
     And where the last row begins, if it may go on.
     """
     free = (share >= FREE) & (rows.bent | (rows.length < SHORT)) & ~_pulls(rows.brake).any(axis=0)
-    heads = _heads(free, speed, _multiples(rows.start + passed, MERGE))
+    heads = _heads(free, speed, _multiples(rows.start + passed, _longest(speed)))
     count = np.diff(np.append(heads, len(share)))
     least = np.repeat(np.minimum.reduceat(share, heads), count)
     bent = np.repeat(np.logical_or.reduceat(rows.bent, heads), count)
@@ -255,7 +258,13 @@ def _levelled(rows: _Stretches, speed: Array, share: Array, passed: float) -> tu
     return level, float(rows.start[heads[-1]]) if free[-1] else np.inf
 
 
-def _multiples(length: Array, cell: float) -> Array:
+def _longest(speed: Array) -> Array:
+    """(K,) m/s -> (K,) m that cells may have: MERGE halved until it lasts no longer than LASTING."""
+    halves = np.floor(np.log2(np.maximum(speed * LASTING / MERGE, 2.0**-20)))
+    return MERGE * np.exp2(np.minimum(halves, 0.0))
+
+
+def _multiples(length: Array, cell: Array | float) -> Array:
     """(K,) m, m -> (K,): whole cells before each length; what rounding has put before a border is on it."""
     whole: Array = np.floor((length + TOUCHING) / cell)
     return whole
