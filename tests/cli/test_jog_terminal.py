@@ -82,6 +82,10 @@ def test_over_loopback(tmp_path: Path) -> None:
 def test_over_a_serial_adapter(tmp_path: Path) -> None:
     with far_side(tmp_path) as url, Terminal(tmp_path, ["jog", "--drives", url]) as terminal:
         driven(terminal)
+        terminal.keys("c", *["Right"] * 10)
+        terminal.shows("hold a key")
+        until(lambda: "nozzle X    0.000" not in terminal.screen, lambda: terminal.screen)
+        terminal.shows("  0.0 mm/s")
         terminal.keys("q")
         assert terminal.code == 0
         assert "leaked" not in terminal.screen
