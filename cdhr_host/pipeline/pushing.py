@@ -88,6 +88,13 @@ def lays(command: Command) -> bool:
     return isinstance(command, Prime)
 
 
+def first_flow(command: Command, air: AirModel, speed_max: float) -> float:
+    """m³/s with which a command begins to lay, as far as the air can; ``speed_max`` m/s is the nozzle's."""
+    flow = _flows(command, speed_max)[1]
+    laid = flow[flow > 0.0]
+    return float(min(laid[0], air.flow_max)) if len(laid) else 0.0
+
+
 class Pushing:
     """Tells which lines of a text are slower than written, because the air pushes no more."""
 

@@ -5,6 +5,7 @@ from concurrent.futures import Executor, Future
 
 import numpy as np
 import pytest
+from stepped import Stepped
 
 from cdhr_host.drives import Loopback
 from cdhr_host.errors import JobError
@@ -24,21 +25,6 @@ class Now(Executor):
         except Exception as error:
             future.set_exception(error)
         return future
-
-
-class Stepped:
-    """Time that passes when a test says so."""
-
-    speed = 1.0
-
-    def __init__(self) -> None:
-        self._now = 0.0
-
-    def now(self) -> float:
-        return self._now
-
-    def wait_until(self, when: float) -> None:
-        self._now = max(self._now, when)
 
 
 class Bench:
@@ -209,7 +195,7 @@ def test_a_pause_of_the_program_holds() -> None:
     bench = Bench()
     bench.send("G1 X10 F1800", "M0 more clay", "G1 X20")
     bench.until(lambda: bench.state is JobState.HELD)
-    assert bench.nozzle()[-1] == pytest.approx([0.01, 0.0, 0.0], abs=1e-6)
+    assert bench.nozzle()[-1] == pytest.approx([0.0, 0.0, 0.02], abs=1e-6)
     bench.printer.resume()
     bench.feed.finish()
     bench.until(lambda: bench.state is JobState.DONE)
