@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from cdhr_host.serve.web.keys import ApiKey
 
 SWITCH = 0.0005
-"""s after which the planning thread gives way to a client's line; Python's own 5 ms would be most of an answer"""
+"""s until the planning thread gives way to a client's line; Python's own 5 ms would be felt in each answer"""
 EXAMPLES = examples(
     "cdhr serve",
     "cdhr serve --marlin /tmp/printer --tcp 8023 --http 7125 --klippy-socket /tmp/klippy.sock",

@@ -100,6 +100,22 @@ def test_a_long_even_bead_has_no_stop_in_it() -> None:
     assert speed[moving[0] + 600 : moving[-1] - 400].min() > 0.01
 
 
+def test_a_slow_bead_has_no_stop_in_it_and_ends_soon_after_its_client_has() -> None:
+    bench = Bench()
+    turns = np.arange(1, 110) / 40.0
+    bench.send(
+        "G1 X40 F6000",
+        *(f"G1 X{40 * np.cos(a):.3f} Y{40 * np.sin(a):.3f} E{40 * a:.3f} F300" for a in turns),
+    )
+    silent = bench.clock.now()
+    assert silent > 15.0
+    bench.until(lambda: not bench.feed.pending)
+    assert bench.clock.now() - silent < 6.0
+    speed = np.linalg.norm(np.diff(bench.nozzle(), axis=0), axis=1) / PROFILE.drives.period
+    moving = np.flatnonzero(speed > 1e-4)
+    assert speed[moving[0] + 600 : moving[-1] - 400].min() > 0.004
+
+
 def test_the_way_is_that_of_the_whole_file() -> None:
     bench = Bench()
     bench.send(*ring())
