@@ -59,6 +59,7 @@ class Word(IntEnum):
     FAULTS = 3
     EXECUTED = 4
     REVISABLE = 5
+    INTERRUPT = 6
 
 
 NOWHERE: Final = -(2**62)
@@ -242,7 +243,7 @@ class Sender:
         return self._link.referenced
 
     def _do_home(self) -> None:
-        self._link.home()
+        self._link.home(lambda: bool(self._status[Word.INTERRUPT]))
 
     def _do_reference(self) -> None:
         self._link.set_reference()

@@ -154,6 +154,7 @@ class SenderLink:
         """Come to rest on the path, air off."""
         if self._process is None:
             raise DriveError(Problem("state", "the drives are closed, not open"))
+        self._status[Word.INTERRUPT] = 0
         if self.state is not LinkState.FAULT:
             self._ask("stop")
 
@@ -164,7 +165,15 @@ class SenderLink:
 
     def home(self) -> None:
         """Reference every axis by homing, one after the other."""
-        self._ask("home")
+        try:
+            self._ask("home")
+        finally:
+            self._status[Word.INTERRUPT] = 0
+
+    def interrupt(self) -> None:
+        """End homing within a cycle; from any thread."""
+        if self._process is not None:
+            self._status[Word.INTERRUPT] = 1
 
     def set_reference(self) -> None:
         """The machine stands at its reference pose: remember it."""
