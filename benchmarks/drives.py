@@ -5,9 +5,10 @@
     python benchmarks/drives.py --stops 20 --rate 250
 
 At 500 Hz the drives answer every fourth SYNC. Needs an otherwise idle machine and permission for
-SCHED_FIFO. Beside the sender runs a bare timer loop of the same rate and higher priority: cycles that
-it skips as well were taken by the computer (a hypervisor's other guests, ``stolen_s``), not by the sender. ``--stops`` stops that many runs on the path, at random, and tells the
-lateness of the cycles around each stop.
+SCHED_FIFO. Beside the sender runs a bare timer loop of the same rate and higher priority: cycles
+that it loses too were taken by the computer (the other guests of a hypervisor, ``stolen_s``), not
+by the sender. ``--stops`` stops that many runs on the path, at random, and tells the lateness of
+the cycles around each stop.
 """
 
 import argparse
