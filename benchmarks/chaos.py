@@ -29,8 +29,10 @@ from cdhr_host.job.surface import JobState
 from cdhr_host.pipeline import Staircase, open_profile
 from cdhr_host.pipeline.course import joined
 
-NEIGHBOURS = 12
+NEIGHBOURS = 64
 """vertices whose chords are looked at: a curve may pass the same place often"""
+APART = 1e-6
+"""m of way between vertices; what is cut off where the path turns back is less"""
 FINER = 10
 """ticks of the path the machine is compared with in one of the drives'"""
 TURN = 0.02
@@ -241,6 +243,7 @@ def _clay_off(executed, dry):
 
 def _away(points, curve):
     """Greatest distance of points from the chords about the vertices of a curve next to them."""
+    curve = _thinned(curve)
     _, nearest = cKDTree(curve).query(points, k=NEIGHBOURS)
     best = np.full(len(points), np.inf)
     for near in nearest.T:
@@ -250,6 +253,13 @@ def _away(points, curve):
             share = np.clip(np.sum(way * along, axis=1) / np.maximum(np.sum(along**2, axis=1), 1e-300), 0, 1)
             best = np.minimum(best, np.linalg.norm(way - share[:, None] * along, axis=1))
     return float(best.max())
+
+
+def _thinned(curve):
+    """The curve's first vertex in every APART of its way: where it rests or creeps, none hide its other passes."""
+    way = np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))
+    piece = np.floor(np.append(0.0, way) / APART)
+    return curve[np.append(True, np.diff(piece) > 0)]
 
 
 def main():

@@ -55,6 +55,8 @@ PAUSES = (0.3, 2.0, 6.0)
 """s between SIGSTOP and SIGCONT; a sender's ring lasts 4 s, a bridge's watchdog a quarter"""
 BEGIN = 90.0
 """s a print may take to begin"""
+BUSY = 10
+"""times a print may fail to begin on a busy computer"""
 QUIET = 1.5
 """s a machine is watched after it came to rest"""
 STILL = 5
@@ -177,7 +179,9 @@ class Trial:
         self.trace = Path(folder) / "trace.csv"
         command = [sys.executable, "-m", "cdhr_host", "sim", "--bus", bus, "--trace", str(self.trace)]
         self.far = subprocess.Popen(command, cwd=REPOSITORY, stdout=subprocess.PIPE, text=True)
-        url = _line(self.far)
+        if not (url := _line(self.far, BEGIN)):
+            self.far.kill()
+            raise NotBegunError("the far side did not start")
         command = [sys.executable, str(Path(__file__).resolve()), "--host", url]
         environment = os.environ | {"PYTHONPATH": str(REPOSITORY)}
         self.host = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
@@ -312,7 +316,7 @@ def one(bus, victim, how, moment, pause):
 
 def begun(*trial):
     """The outcome of a trial, tried again where the computer was too busy to begin it."""
-    for _ in range(5):
+    for _ in range(BUSY):
         try:
             return one(*trial)
         except NotBegunError as word:
@@ -326,7 +330,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--host", metavar="URL", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
-    if arguments.host:
+    if arguments.host is not None:
         be_host(arguments.host)
         return
     chance = random.Random(arguments.seed)

@@ -4,13 +4,17 @@
     python benchmarks/drives.py --minutes 5 --rate 500
     python benchmarks/drives.py --stops 20 --rate 250
 
-At 500 Hz the drives answer every fourth SYNC. Needs an otherwise idle machine; real-time priority
-is used where it is allowed. ``--stops`` stops that many runs on the path, at random, and tells the
-lateness of the cycles around each stop.
+At 500 Hz the drives answer every fourth SYNC. Needs an otherwise idle machine and permission for
+SCHED_FIFO. Beside the sender runs a bare timer loop of the same rate and higher priority: cycles
+that it loses too were taken by the computer (the other guests of a hypervisor, ``stolen_s``), not
+by the sender. ``--stops`` stops that many runs on the path, at random, and tells the lateness of
+the cycles around each stop.
 """
 
 import argparse
+import gc
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -30,6 +34,7 @@ from cdhr_host.profile import find, read_table, validate
 from cdhr_host.values import Setpoints
 
 REPOSITORY = Path(__file__).resolve().parents[1]
+PRIORITY = 60
 TICK = os.sysconf("SC_CLK_TCK")
 
 
@@ -86,25 +91,65 @@ def opened(hz):
         far = subprocess.Popen(command, cwd=REPOSITORY, stdout=subprocess.PIPE, text=True)
         url = far.stdout.readline().strip()
         link = SenderLink(url, profile, folder / "references.json")
-        link.open()
-        yield link, profile, far, record.with_suffix(".json")
+        try:
+            link.open()
+            yield link, profile, far, record.with_suffix(".json")
+        finally:
+            ended(link, far)
 
 
 def ended(link, far):
-    """Close both sides."""
+    """Close both sides; harmless when done already."""
     link.close()
     far.send_signal(signal.SIGTERM)
     far.wait()
+    far.stdout.close()
+
+
+def stolen():
+    """S the hypervisor had this machine's processors for others."""
+    return int(Path("/proc/stat").read_text().split("\n", 1)[0].split()[8]) / TICK
+
+
+def bare(hz, pipe):
+    """A loop of the same rate and a higher priority that does nothing: what this computer can at best."""
+    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY + 1))
+    gc.freeze()
+    gc.disable()
+    period, late, skipped, worst = 1.0 / hz, 0.0, 0, 0.0
+    due = time.monotonic() + period
+    while not pipe.poll():
+        time.sleep(max(due - time.monotonic(), 0.0))
+        late = time.monotonic() - due
+        worst = max(worst, late)
+        lost = int(late / period)
+        skipped += lost
+        due += (1 + lost) * period
+    pipe.send({"bare_max_ms": round(worst * 1e3, 3), "bare_skipped": skipped})
+
+
+@contextmanager
+def beside(hz, found):
+    """A bare loop runs meanwhile; what it saw goes to ``found``."""
+    context = multiprocessing.get_context("spawn")
+    near, far = context.Pipe()
+    process = context.Process(target=bare, args=(hz, far), daemon=True)
+    process.start()
+    before = stolen()
+    yield
+    found["stolen_s"] = round(stolen() - before, 2)
+    near.send(None)
+    found |= near.recv()
+    process.join()
 
 
 def stops(count, hz):
     """Runs that are stopped at random; a record."""
     chance, found, start = np.random.default_rng(1), [], np.zeros(6)
-    with opened(hz) as (link, profile, far, _):
+    with opened(hz) as (link, profile, _, _):
         for _ in range(count):
             timing, start = stopped(link, profile, start, chance.uniform(1.0, 2.0))
             found.append(timing)
-        ended(link, far)
     return {
         "hz": hz,
         "stops": count,
@@ -140,7 +185,9 @@ def measure(seconds, hz):
     with opened(hz) as (link, profile, far, report):
         count = int(seconds * hz)
         before = cpu(link.pid)
-        summary = stream(rows(count, profile.drives.period), link, MonotonicClock(), start=np.zeros(6))
+        found = {}
+        with beside(hz, found):
+            summary = stream(rows(count, profile.drives.period), link, MonotonicClock(), start=np.zeros(6))
         used = cpu(link.pid) - before
         ended(link, far)
         timing = summary.timing
@@ -155,6 +202,8 @@ def measure(seconds, hz):
             "skipped": timing.skipped,
             "sender_cpu_percent": round(100 * used / summary.duration, 1),
             "lost_ticks": json.loads(report.read_text())["lost_ticks"],
+            "load": round(os.getloadavg()[1], 1),
+            **found,
         }
 
 

@@ -50,7 +50,7 @@ def lines(count: int) -> Iterator[bytes]:
     for k in range(count):
         angle = k * STEP_MM / RADIUS_MM
         x, y = RADIUS_MM * math.cos(angle), RADIUS_MM * math.sin(angle)
-        yield f"G1 X{x:.4f} Y{y:.4f} E{k * 0.05:.4f}\n".encode()
+        yield f"G1 X{x:.6f} Y{y:.6f} E{k * 0.01:.4f}\n".encode()
 
 
 def printed(path: str, count: int) -> int:

@@ -258,3 +258,7 @@ class Feedback(_Frozen):
 
     def __len__(self) -> int:
         return len(self.tick)
+
+    def __getitem__(self, rows: slice | Flags | Ints) -> "Feedback":
+        columns = (getattr(self, field.name) for field in fields(self))
+        return Feedback(*(column[rows] if len(column) else column for column in columns))

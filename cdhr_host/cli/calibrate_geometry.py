@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from cdhr_host.mechanism.calibration_model import Doubts
     from cdhr_host.profile import Profile
     from cdhr_host.report.studies.fit import GeometryFit
+    from cdhr_host.report.studies.poses import Poses
+    from cdhr_host.values import Array
 
 GEOMETRY = examples(
     "cdhr calibrate geometry points.csv",
@@ -29,6 +31,7 @@ GEOMETRY = examples(
 PLAN = examples(
     "cdhr calibrate plan poses.csv",
     "cdhr calibrate plan poses.csv --count 40 --gcode poses.gcode --profile paper-wide",
+    "cdhr calibrate plan pretended.csv --pretend 1",
 )
 FEWEST = 4
 """poses that make a calibration"""
@@ -113,6 +116,12 @@ def plan(  # noqa: PLR0917 -- options
     attachment_doubt: AttachmentDoubt = 0.5,
     offset_doubt: OffsetDoubt = 3.0,
     radius_doubt: RadiusDoubt = 0.3,
+    pretend: Annotated[
+        int | None,
+        typer.Option(
+            metavar="SEED", help="Fill in what a simulated machine, drawn from the doubts, measures.", min=0
+        ),
+    ] = None,
     json_: Json = False,
 ) -> None:
     """Propose the poses that tell most about the geometry, inside the workspace, in a short way round."""
@@ -134,7 +143,7 @@ def plan(  # noqa: PLR0917 -- options
             5,
         )
     told = f"cdhr calibrate plan {table} --profile {profile} --count {count}"
-    texts = [(table, "\n".join(sheet(poses)))]
+    texts = [(table, "\n".join(sheet(poses, _pretended(machine, doubts, poses, noise * MM, pretend))))]
     if gcode is not None:
         texts.append((gcode, "\n".join(program(poses, told))))
     _put(texts)
@@ -142,9 +151,23 @@ def plan(  # noqa: PLR0917 -- options
         places = (poses.position_G / MM).tolist()
         emit(json.dumps({"profile": profile, "poses_mm": places, "slider_mm": (poses.slider / MM).tolist()}))
         return
-    emit(f"{table}: {len(poses.position_G)} poses; fill in what is measured, then cdhr calibrate geometry")
+    todo = "fill in what is measured, then" if pretend is None else "measured at a simulated machine; next:"
+    emit(f"{table}: {len(poses.position_G)} poses; {todo} cdhr calibrate geometry")
     if gcode is not None:
         emit(f"{gcode}: goes there and waits at each; cdhr stream {gcode} --profile {profile}")
+
+
+def _pretended(
+    machine: "Profile", doubts: "Doubts", poses: "Poses", noise: float, seed: int | None
+) -> "Array | None":
+    """(N, 3) m that a machine drawn from the doubts has at these poses; nothing without a seed."""
+    if seed is None:
+        return None
+    from cdhr_host.mechanism import Cables
+    from cdhr_host.report.studies.trials import Trial, measured
+
+    run_out = poses.slider[:, :3]
+    return measured(Trial(seed, Cables.from_profile(machine), doubts, run_out, run_out[:0], noise))[1]
 
 
 def _doubts(pulley: float, attachment: float, offset: float, radius: float) -> "Doubts":

@@ -1,6 +1,9 @@
 """``cdhr jog``: move the machine by keys and typed G-code."""
 
 import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -9,6 +12,7 @@ from cdhr_host.cli.interrupt import StopRequest
 from cdhr_host.cli.machine import SIMULATED, open_machine, opened
 from cdhr_host.cli.options import DrivesUrl, MaterialName, ProfileName, examples
 from cdhr_host.cli.refusals import INTERRUPTED, Refusal, emit
+from cdhr_host.errors import CdhrError
 
 if TYPE_CHECKING:
     from cdhr_host.job.printer import Printer
@@ -18,6 +22,8 @@ EXAMPLES = examples(
     "cdhr jog --profile paper-wide",
     "printf 'G1 X10 F600\\nG28\\n' | cdhr jog",
 )
+LOOK = 0.05
+"""s between two looks at a request to stop"""
 
 
 def jog(
@@ -66,10 +72,38 @@ def _has_screen() -> bool:
 def _screen(printer: "Printer") -> int:
     """Keys, until the operator quits or the terminal is gone; refusals were shown."""
     from cdhr_host.console.desk import Desk
+    from cdhr_host.console.terminal import hung_up
 
     with StopRequest() as stop:
-        Desk(printer, should_stop=stop).run()
-    return INTERRUPTED if stop.asked else 0
+
+        def should_stop() -> bool:
+            return stop() or hung_up()
+
+        with _resting(printer, should_stop):
+            desk = Desk(printer, should_stop=should_stop)
+            desk.run()
+            return INTERRUPTED if should_stop() else desk.return_code or 0
+
+
+@contextmanager
+def _resting(printer: "Printer", should_stop: Callable[[], bool]) -> Iterator[None]:
+    """Inside, the machine comes to rest once ``should_stop`` says so, even while the screen waits."""
+    over = threading.Event()
+
+    def watch() -> None:
+        while not over.wait(LOOK):
+            if should_stop():
+                with suppress(CdhrError):
+                    printer.hold("the terminal is gone")
+                return
+
+    thread = threading.Thread(target=watch, name="cdhr-terminal")
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
 
 
 def _lines(printer: "Printer") -> int:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from cdhr_host.serve.server import Doors, Server
     from cdhr_host.serve.web.keys import ApiKey
 
+SWITCH = 0.0005
+"""s until the planning thread gives way to a client's line; Python's own 5 ms would be felt in each answer"""
 EXAMPLES = examples(
     "cdhr serve",
     "cdhr serve --marlin /tmp/printer --tcp 8023 --http 7125 --klippy-socket /tmp/klippy.sock",
@@ -120,6 +123,7 @@ def _serve(
     from cdhr_host.serve.server import Server
 
     logging.basicConfig(level=logging.WARNING, format="cdhr: %(message)s")
+    sys.setswitchinterval(SWITCH)
     link, clock = opened(drives, machine, speed)
     try:
         printer = Printer(link, clock, recorder=Recorder(link, Names(*names, drives)))

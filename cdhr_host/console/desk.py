@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path
-from typing import ClassVar, Final
+from typing import ClassVar, Final, cast
 
 from textual import events
 from textual.app import App, ComposeResult
@@ -16,6 +16,7 @@ from cdhr_host.console import panels
 from cdhr_host.console.entry import History, WordSuggester, history_file
 from cdhr_host.console.help import HELP
 from cdhr_host.console.jogging import AXES, SLIDERS, Jogging
+from cdhr_host.console.terminal import Terminal
 from cdhr_host.errors import CdhrError
 from cdhr_host.job.surface import Event, JobState, Reply, Surface
 
@@ -39,7 +40,8 @@ class Keys(ModalScreen[None]):
     def on_key(self, event: events.Key) -> None:
         """Any key closes, and does nothing else."""
         event.stop()
-        self.dismiss()
+        if self.is_current:  # a second key may be on its way already
+            self.dismiss()
 
 
 class Desk(App[None]):
@@ -78,7 +80,7 @@ class Desk(App[None]):
         should_stop: Callable[[], bool] = lambda: False,
     ) -> None:
         """Leaves, with the machine at rest, once ``should_stop`` says so."""
-        super().__init__()
+        super().__init__(driver_class=Terminal)
         self._should_stop = should_stop
         self._surface = surface
         self._history = History(history or history_file())
@@ -119,18 +121,29 @@ class Desk(App[None]):
         """The terminal lost the focus: no key of it is held any more."""
         self._jogging.release()
 
-    def on_key(self, event: events.Key) -> None:
-        """Jog keys and the small ones; typed text has the focus of its own."""
+    async def on_event(self, event: events.Event) -> None:
+        """Keys act in the order they were typed in, before any of them wanders through the widgets.
+
+        What is typed fast after a prompt was opened must become text, never a command.
+        """
+        typed = isinstance(event, events.Key) and not event.is_forwarded and len(self.screen_stack) == 1
+        if not (typed and self._pressed(cast("events.Key", event))):
+            await super().on_event(event)
+
+    def _pressed(self, event: events.Key) -> bool:
+        """Whether this key was for the desk itself; typed text has the focus of its own."""
         if self._prompt:
-            self._typed_key(event)
-        elif self._choosing:
-            self._choose(event)
-        elif event.key in AXES:
+            return self._typed_key(event.key)
+        if self._choosing:
+            self._choose(event.key)
+            return True
+        if event.key in AXES:
             self._try(lambda: self._jogging.press(event.key))
-            event.stop()
-        elif act := self._small_keys().get(event.character or "", self._named_keys().get(event.key)):
+            return True
+        act = self._small_keys().get(event.character or "") or self._named_keys().get(event.key)
+        if act is not None:
             self._try(act)
-            event.stop()
+        return act is not None
 
     def say(self, text: str) -> None:
         """Add to the messages."""
@@ -171,6 +184,10 @@ class Desk(App[None]):
         """Ask for a file to print."""
         self._open_entry(FILE)
 
+    async def action_quit(self) -> None:
+        """Textual's own key, Ctrl-Q."""
+        self.action_leave()
+
     def action_leave(self) -> None:
         """Quit; while the machine moves only at the second time, after a hold."""
         if self._surface.status().state in MOVING and not self._leaving:
@@ -198,18 +215,24 @@ class Desk(App[None]):
             self._history.add(text)
             self.run_code(text)
 
-    def _typed_key(self, event: events.Key) -> None:
-        if event.key == "escape":
+    def _typed_key(self, key: str) -> bool:
+        if key == "escape":
             self._close_entry()
-        elif event.key in {"up", "down"} and self._prompt == CODE:
+        elif key in {"up", "down"} and self._prompt == CODE:
             entry = self.query_one(Input)
-            entry.value = self._history.step(-1 if event.key == "up" else 1)
+            entry.value = self._history.step(-1 if key == "up" else 1)
             entry.cursor_position = len(entry.value)
-            event.stop()
+        else:
+            return False
+        return True
 
     def _small_keys(self) -> dict[str, Callable[[], None]]:
         """Character -> what it does."""
         return {
+            " ": self.action_hold_or_resume,
+            "!": self.action_emergency,
+            "?": self.action_help,
+            "q": self.action_leave,
             "+": lambda: self._jogging.resize(1),
             "-": lambda: self._jogging.resize(-1),
             "c": self._jogging.toggle,
@@ -227,6 +250,9 @@ class Desk(App[None]):
         """Name of a key without a character of its own -> what it does."""
         return {
             "escape": lambda: self._jogging.choose(None),
+            "f3": self.action_ask_file,
+            "f5": self.action_start,
+            "f8": self.action_abort,
             "f9": self._surface.acknowledge,
             "f10": self.action_leave,
         }
@@ -237,13 +263,12 @@ class Desk(App[None]):
         self._choosing = True
         self.say("which slider alone? 1 to 6; any other key: none")
 
-    def _choose(self, event: events.Key) -> None:
+    def _choose(self, key: str) -> None:
         """A digit after ``s``."""
         self._choosing = False
-        event.stop()
-        if event.key in SLIDERS:
-            self._jogging.choose(SLIDERS.index(event.key))
-            self.say(f"up, right: slider {event.key} pays out; down, left: takes in; Esc ends this")
+        if key in SLIDERS:
+            self._jogging.choose(SLIDERS.index(key))
+            self.say(f"up, right: slider {key} pays out; down, left: takes in; Esc ends this")
 
     def _override(self, *, feed: float = 0.0, flow: float = 0.0) -> None:
         status = self._surface.status()
@@ -255,7 +280,7 @@ class Desk(App[None]):
     def _open_entry(self, prompt: str) -> None:
         self._jogging.release()
         self._ask(prompt)
-        self.query_one(Input).focus()
+        self.screen.set_focus(self.query_one(Input))  # at once: the next key is text
 
     def _close_entry(self) -> None:
         self._ask("")

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from cdhr_host.drives.address import port_of, split_rate
-from cdhr_host.drives.bridge.line import SerialLine
+from cdhr_host.drives.bridge.line import BridgeLine
 from cdhr_host.drives.bridge.objects import BridgeObjects
 from cdhr_host.drives.canopen.bus import Bus
 from cdhr_host.drives.clock import Clock
@@ -46,5 +46,5 @@ def connect(url: str, clock: Clock) -> ObjectAccess:
     """The objects behind a drives URL; close it. Raises DriveError."""
     if url.partition(":")[0] == "link":
         path, baud = split_rate(url, "BAUD", 921_600)
-        return BridgeObjects(clock, lambda: SerialLine(path, baud))
+        return BridgeObjects(clock, lambda: BridgeLine(path, baud))
     return Bus(port_of(url), clock)

@@ -26,6 +26,8 @@ class BufferedLink:
         self._executed: list[Feedback] = []
         self._fault: DriveError | None = None
         self._told = True
+        self.interrupted = False
+        """whether homing is to end"""
 
     @property
     def free(self) -> int:
@@ -49,6 +51,10 @@ class BufferedLink:
     def home(self) -> None:
         """Nothing to find: the machine knows its reference pose."""
         self._expect(LinkState.OPEN, LinkState.STOPPED)
+
+    def interrupt(self) -> None:
+        """End homing within a cycle."""
+        self.interrupted = True
 
     def stop_rows(self, ahead: Setpoints) -> Setpoints:
         """What is played instead of ``ahead`` once the link stops."""

@@ -171,6 +171,7 @@ class CyclicLink(BufferedLink):
 
     def stop(self) -> None:
         """Come to rest on the path, air off."""
+        self.interrupted = False
         if self.state is LinkState.CLOSED:
             self._expect(LinkState.OPEN)
         elif self.state is LinkState.ARMED:
@@ -204,10 +205,13 @@ class CyclicLink(BufferedLink):
             return False
         return True
 
-    def home(self) -> None:
+    def home(self, should_stop: Callable[[], bool] | None = None) -> None:
         """Reference every axis by homing, where the profile says so. OPEN or STOPPED only."""
         self._expect(LinkState.OPEN, LinkState.STOPPED)
-        self._reference.home(self.machine)
+        try:
+            self._reference.home(self.machine, should_stop or (lambda: self.interrupted))
+        finally:
+            self.interrupted = False
 
     def set_reference(self) -> None:
         """The machine stands at its reference pose: remember it for each drive's serial number."""

@@ -20,7 +20,6 @@ HINTS: Final = {
     "pressure-sensor": "check the sensor's cable; prefer 4-20 mA",
     "air-lost": "check the air supply",
     "emergency-stop": "release the emergency stop, look at the machine, then arm again",
-    "unreferenced": "cdhr drives reference (the machine stands at its reference pose), or cdhr drives home",
     "jitter": "allow real-time priority, or set [canopen] allow_soft_realtime = true",
     "ring": "the computer's memory is not to be trusted: test it before the next print",
     "sender": "the sending process ended; the drives stopped by their own watchdogs",

@@ -90,8 +90,13 @@ class MachineLink(Protocol):
     def home(self) -> None:
         """Find the reference pose by the drives' homing, one slider after the other. OPEN or STOPPED.
 
-        Nothing to do where the profile's drives know it by themselves. Raises DriveError.
+        Nothing to do where the profile's drives know it by themselves. Raises DriveError, also
+        once ``interrupt`` was called.
         """
+        ...
+
+    def interrupt(self) -> None:
+        """End ``home`` within a cycle, from any thread; harmless when nothing is being homed."""
         ...
 
     def arm(self, start: Array) -> None:

@@ -3,13 +3,20 @@
 import json
 import os
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
-from cdhr_host.drives.faults import fault
 from cdhr_host.errors import DriveError, Problem
 from cdhr_host.profile.schema import Profile
 from cdhr_host.values import Ints
+
+NEXT_STEP: Final = {
+    "homing": "G28, or cdhr drives home: one slider after the other finds its home, with little torque",
+    "stored": "bring the machine to its reference pose, then: cdhr drives reference",
+    "drive": "check the encoder and the drive's zero, then open the drives again",
+}
+"""by ``[canopen] reference``"""
 
 
 def default_store() -> Path:
@@ -61,7 +68,7 @@ class ReferenceStore:
         entries = self.load()
         absent = [k + 1 for k, serial in enumerate(serials) if _key(profile, serial) not in entries]
         if absent:
-            raise unreferenced(absent)
+            raise unreferenced(absent, "stored")
         return np.array([entries[_key(profile, serial)] for serial in serials], dtype=np.int64)
 
     def mark(self, profile: Profile, serials: list[int], marks: list[int]) -> None:
@@ -82,10 +89,12 @@ class ReferenceStore:
         fresh.replace(self.path)
 
 
-def unreferenced(axes: list[int]) -> DriveError:
-    """Motion is refused; numbers from 1."""
+def unreferenced(axes: list[int], mode: str) -> DriveError:
+    """Motion is refused; numbers from 1, and ``[canopen] reference``, which knows the next step."""
     names = ", ".join(map(str, axes))
-    return fault("unreferenced", f"not referenced: drive {names}; nothing may move")
+    return DriveError(
+        Problem("unreferenced", f"not referenced: drive {names}; nothing may move", hint=NEXT_STEP[mode])
+    )
 
 
 def _key(profile: Profile, serial: int) -> str:

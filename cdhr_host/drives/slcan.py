@@ -1,20 +1,20 @@
 """CAN over a serial line: the LAWICEL text protocol, read and written in bulk.
 
-One ``os.read`` takes what the line holds and one ``os.write`` sends a whole cycle of frames,
-so that 250 cycles of 14 frames a second cost a few percent of a core. A line that hung up
-is noticed by the next ``receive`` or ``transmit``, whichever comes first.
+One read takes what has arrived and one write sends a whole cycle of frames, so that 250 cycles
+of 14 frames a second cost a few percent of a core. A line that hung up is noticed by the next
+``receive`` or ``transmit``, whichever comes first.
 """
 
-import os
-import select
 import time
 from collections import deque
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, Final
 
 import can
-import serial
 from can.typechecking import CanFilters
+
+from cdhr_host.drives.serial_line import SerialLine
 
 Frame = tuple[int, bytes]
 """11-bit identifier and up to 8 bytes"""
@@ -70,17 +70,20 @@ class SlcanBus(can.BusABC):
             known = ", ".join(map(str, BITRATES))
             raise can.CanInitializationError(f"bit rate {bitrate} is not one of {known}")
         try:
-            self._port = serial.Serial(channel, baudrate=BAUD, timeout=0, exclusive=True)
-        except (OSError, ValueError) as error:
-            raise can.CanInitializationError(f"cannot open {channel}: {error}") from error
-        self._fd = self._port.fileno()
-        self._poll = select.poll()
-        self._poll.register(self._fd, select.POLLIN)
+            self._line = SerialLine(channel, BAUD, PATIENCE)
+        except OSError as error:
+            raise can.CanInitializationError(str(error)) from error
+        self._closed = False
         self._tail = b""
         self._waiting: deque[can.Message] = deque()
         self.dropped = self.rejected = self.flags = 0
         self._write(f"C\r{BITRATES[bitrate]}\rO\r".encode())
         super().__init__(channel=channel, **kwargs)
+
+    @property
+    def heard(self) -> int:
+        """Bytes that have arrived."""
+        return self._line.heard
 
     def transmit(self, frames: Sequence[Frame]) -> None:
         """Send frames with one write; raises can.CanOperationError."""
@@ -88,13 +91,11 @@ class SlcanBus(can.BusABC):
 
     def receive(self, timeout: float = 0.0) -> list[Frame]:
         """All frames that have arrived, waiting up to ``timeout`` s for the first byte."""
-        events = self._poll.poll(timeout * 1e3)
-        if not events:
-            return []
-        data = self._read() if events[0][1] & select.POLLIN else b""
-        if not data:
-            raise can.CanOperationError(f"the adapter {self._port.port} is gone")
-        return self._frames(data)
+        try:
+            data = self._line.read(timeout)
+        except OSError as error:
+            raise can.CanOperationError(f"the adapter {error}") from error
+        return self._frames(data) if data else []
 
     def ask_status(self) -> None:
         """Ask for the status byte; it arrives among the frames and is kept in ``flags``."""
@@ -109,13 +110,11 @@ class SlcanBus(can.BusABC):
     def shutdown(self) -> None:
         """Close the channel and the line."""
         super().shutdown()
-        if self._port.is_open:
-            try:
+        if not self._closed:
+            self._closed = True
+            with suppress(can.CanOperationError):
                 self._write(b"C\r")
-            except can.CanOperationError:
-                pass
-            finally:
-                self._port.close()
+            self._line.close()
 
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         if not self._waiting:
@@ -128,14 +127,6 @@ class SlcanBus(can.BusABC):
 
     def _apply_filters(self, filters: CanFilters | None) -> None:
         """Frames are filtered by python-can."""
-
-    def _read(self) -> bytes:
-        try:
-            return os.read(self._fd, 65536)
-        except BlockingIOError:
-            return b"\r"
-        except OSError as error:
-            raise can.CanOperationError(f"the adapter {self._port.port} is gone: {error.strerror}") from error
 
     def _frames(self, data: bytes) -> list[Frame]:
         lines = (self._tail + data.replace(b"\a", b"\a\r")).split(b"\r")
@@ -167,14 +158,7 @@ class SlcanBus(can.BusABC):
             self.dropped += 1
 
     def _write(self, data: bytes) -> None:
-        view = memoryview(data)
-        while view:
-            try:
-                view = view[os.write(self._fd, view) :]
-            except BlockingIOError:
-                if not select.select([], [self._fd], [], PATIENCE)[1]:
-                    raise can.CanOperationError("the adapter takes no more frames") from None
-            except OSError as error:
-                raise can.CanOperationError(
-                    f"the adapter {self._port.port} is gone: {error.strerror}"
-                ) from error
+        try:
+            self._line.write(data)
+        except OSError as error:
+            raise can.CanOperationError(f"the adapter {error}") from error

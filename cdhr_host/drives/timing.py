@@ -42,11 +42,12 @@ class Lateness:
         self.real_time = False
         self._in_a_row = max(soft, 1)
         self._budget = BUDGET * SOFT if soft else BUDGET
+        self._bins = np.zeros(BINS, dtype=np.int64)
         self.reset()
 
     def reset(self) -> None:
         """Begin anew."""
-        self._bins = np.zeros(BINS, dtype=np.int64)
+        self._bins.fill(0)
         self._cycles = self._skipped = self._late = 0
         self._max = 0.0
         self._late_at: list[int] = []

@@ -72,7 +72,7 @@ class Acts:
             standing=player.standing,
             overrides=(player.feed, player.gain),
             homed=player.homed,
-            referenced=player.link.state is not LinkState.CLOSED,
+            referenced=player.referenced,
             buffered=player.feeder.buffered,
             progress=progress,
         )
@@ -108,6 +108,7 @@ class Acts:
 
     def check_start(self) -> None:
         """Raises JobError where no print can begin."""
+        self.player.check_referenced()
         if not self.player.homed:
             self.player.refuse_start()
         self.check_busy()
@@ -191,6 +192,7 @@ class Acts:
             link.close()
         if link.state is LinkState.CLOSED:
             link.open()
+        self.player.refer()
         self.player.over()
         self.records.acknowledged()
 

@@ -16,6 +16,8 @@ from cdhr_host.pipeline.course import Course, Stop
 from cdhr_host.pipeline.score import Gain, Part, Score
 from cdhr_host.values import Array, Feedback, Setpoints
 
+PLAYING: Final = frozenset({LinkState.ARMED, LinkState.RUNNING})
+STOOD: Final = frozenset({LinkState.STOPPED, LinkState.FAULT, LinkState.CLOSED})
 KEPT: Final = 64
 """ticks of the plan kept behind what was executed"""
 
@@ -75,6 +77,11 @@ class Feeder:
             return True
         return self._tick >= self.score.last.pace.settled
 
+    @property
+    def plays(self) -> bool:
+        """Whether the link takes rows and executes them."""
+        return self.link.state in PLAYING
+
     def begin(self, course: Course, rate: float, gain: Gain) -> None:
         """Play a course from its first tick; the machine is at rest."""
         if self.arm():
@@ -118,6 +125,7 @@ class Feeder:
         feedback = self.link.feedback()
         self._plan_stop()
         if not len(feedback):
+            self._check_alive()
             return []
         if len(feedback) > len(self._sent):
             raise DriveError(Problem("echo", "the drives executed more rows than were sent"))
@@ -127,6 +135,13 @@ class Feeder:
         self._done = rows[-HISTORY:] if self._done is None else joined([self._done, rows])[-HISTORY:]
         self._forget(int(rows.tick[-1]))
         return [(rows, feedback)]
+
+    def _check_alive(self) -> None:
+        """Raises DriveError where the link has stopped for good while something is to be played."""
+        if self.making is not None and self.link.state in STOOD:
+            raise DriveError(
+                Problem("stopped", "the drives came to rest by themselves and take no more setpoints")
+            )
 
     @property
     def changeable(self) -> int:

@@ -164,10 +164,14 @@ class Feeds:
         ahead = self._changes.ahead(other, start.u, tick, before=score.before(tick))
         shaped = partial(_shaped, start, target)
         for pace in choices(ahead, shaped, tick, abs(target - start.rate), waits=(0.0,)):
-            with suppress(CdhrError):
+            try:
                 feeder.revise(score.with_part(Part(tick, other, pace)), first)
-                self._changes.wanted = target
-                return True
+            except CdhrError:
+                if not feeder.plays:  # a fault of the far side, which is told once
+                    raise
+                continue
+            self._changes.wanted = target
+            return True
         return False
 
     def _start(self, part: Part, other: Course, tick: int) -> Start | None:

@@ -18,7 +18,9 @@ from cdhr_host.job.surface import JobState
 from cdhr_host.values import Array
 
 LEASE: Final = 0.15
-"""s of real time"""
+"""s of real time from the last wish until the stop has begun"""
+NOTICE: Final = 0.02
+"""s of it until a turn has seen it, and for the rows that cannot be replaced any more"""
 ALIKE: Final = 1e-6
 """m/s between two wishes that are one"""
 
@@ -48,7 +50,7 @@ class Jogging:
         limit = self._player.profile.limits.speed_max
         speed = float(np.linalg.norm(velocity))
         self._wish = velocity if speed <= limit else velocity * (limit / speed)
-        self._until = self._clock.now() + LEASE * max(min(self._clock.speed, 1e3), 1.0)
+        self._until = self._clock.now() + (LEASE - NOTICE) * max(min(self._clock.speed, 1e3), 1.0)
 
     def end(self) -> None:
         """Come to rest."""

@@ -20,13 +20,15 @@ from cdhr_host.pipeline.foreseen import Foresight
 from cdhr_host.values import Command, Moves
 
 AHEAD: Final = 3.0
-"""s of real time drawn ahead; a client that pauses is obeyed that late"""
-FAR: Final = 6
-"""times as much where what is drawn does not settle: long gentle bends are planned in long pieces"""
+"""s of real time drawn ahead; a client that pauses by sending nothing is obeyed that late"""
+FURTHER: Final = 0.5
+"""s more at a time, while too little of what is drawn is settled, up to"""
+FAR: Final = 18.0
+"""s"""
 WAITING_MAX: Final = 256
-"""short lines not read yet while the plan needs more"""
+"""lines not read yet while the plan needs more"""
 WAITING_FULL: Final = 8
-"""the same otherwise: more than any client has in flight"""
+"""the same at first and while it does not, as far as they last no longer than FURTHER"""
 TOGETHER: Final = 256
 """short lines read at once"""
 EVERY: Final = 0.05
@@ -36,7 +38,9 @@ SETTLED: Final = 1.0
 SHORT: Final = 0.1
 """s a line lasts that counts as short"""
 PATIENCE: Final = 0.1
-"""s of real time without a line after which the plan is brought to rest"""
+"""s of real time without a line after which what was sent is brought to rest"""
+SENDING: Final = 0.3
+"""the same once a client has sent more than WAITING_FULL lines: it has more, but was kept from sending"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,16 +75,20 @@ class LineStream:
         self._machine = machine
         self._foresight = Foresight(machine)
         self._tell, self._now = tell, now
-        self._ahead = AHEAD * speed / machine.period
+        self._speed = speed
+        self._second = speed / machine.period
+        """ticks of the plan in a second of real time"""
         self._lock = threading.Lock()
         self._waiting: deque[Waiting] = deque()
-        self._settled = rows_needed(machine.profile) + SETTLED * speed / machine.period
+        self._settled = rows_needed(machine.profile) + SETTLED * self._second
         self._settled_to = 0.0
         self._next = self.began
         self._room = WAITING_FULL
         self._offered = 0
         self._done = 0
         self._together = 1
+        self._lasting = 0.0
+        """s of real time that each of the lines read last asks for"""
         self._heard = self.began
         self._finished = False
         self._seen = self.course.first
@@ -119,21 +127,35 @@ class LineStream:
         """Whether further lines are there, or may still come in time."""
         if self._waiting and self.refusal is None:
             return True
-        return not self._finished and self._now() - self._heard < PATIENCE
+        patience = PATIENCE if self._offered <= WAITING_FULL else SENDING
+        return not self._finished and self._now() - self._heard < patience
 
     def read(self, played: float) -> None:
-        """Read lines while less than ``AHEAD`` is drawn beyond ``played``, a tick of the plan."""
+        """Read lines while too little is drawn beyond ``played``, a tick of the plan."""
         short = self._together > 1
         thin = self.course.staircase.tick - played < self._settled
-        wanted = self._ahead * (FAR if thin else 1)
+        wanted = self._wanted(played, thin=thin)
         if self.refusal is None and self._waiting and self._now() >= self._next:
             self._next = self._now() + (EVERY if short else 0.0)
-            self._read_until(played + wanted)
-        hungry = self.course.ahead - played < wanted
-        self._room = WAITING_MAX if hungry and self._together > 1 else WAITING_FULL
+            self._read_until(played + wanted * self._second)
+        missing = wanted - (self.course.ahead - played) / self._second
+        self._room = self._room_for(missing)
         if thin and not self.course.rests:
             self._settle()
-        self.full = not hungry and self.course.staircase.tick - played < self._settled
+        self.full = missing <= 0.0 and self.course.staircase.tick - played < self._settled
+
+    def _wanted(self, played: float, *, thin: bool) -> float:
+        """S of real time to be drawn beyond a tick of the plan."""
+        drawn = (self.course.ahead - played) / self._second
+        return max(AHEAD, min(drawn + FURTHER, FAR)) if thin else AHEAD
+
+    def _room_for(self, missing: float) -> int:
+        """Lines that may wait where s of real time are missing: no more than ``missing`` or a little."""
+        if not self._lasting:
+            return WAITING_FULL
+        count = int(max(missing, FURTHER) / self._lasting)
+        most = WAITING_MAX if missing > 0.0 else WAITING_FULL
+        return max(1, min(count, most))
 
     def _read_until(self, tick: float) -> None:
         while self.refusal is None and self._waiting and self.course.ahead < tick:
@@ -206,8 +228,9 @@ class LineStream:
         problem, commands = self._read("".join(f"{each.text}\n" for each in batch))
         if problem is None:
             self.course.add(commands)
-            lasting = sum(map(_duration, commands)) / len(batch)
-            self._together = TOGETHER if lasting < SHORT else 1
+            asked = sum(map(_duration, commands)) / len(batch)
+            self._together = TOGETHER if asked < SHORT else 1
+            self._lasting = asked / self._speed
             return
         self._machine.restore(before)
         if len(batch) == 1:

@@ -15,8 +15,8 @@ from cdhr_host.job.telling import Telling
 from cdhr_host.motion.hold import rows_needed
 from cdhr_host.pipeline.course import Stop
 
-LEAD: Final = 0.25
-"""s of real time planned before playing begins, while more lines may come"""
+LEAD: Final = 0.5
+"""s of real time planned before playing begins, beyond the far side's reserve, while more lines may come"""
 MOVES: Final = frozenset({JobState.PRINTING, JobState.RESUMING})
 
 
@@ -32,8 +32,8 @@ class Lines:
         self._telling = telling
         self._happened = happened
         self._stream: LineStream | None = None
-        self._lead = round(LEAD * self._speed / player.profile.drives.period)
         self._reserve = rows_needed(player.profile)
+        self._lead = self._reserve + round(LEAD * self._speed / player.profile.drives.period)
 
     def open(self, name: str) -> LineStream:
         """A new stream; the machine stands, and no other word moves it meanwhile."""

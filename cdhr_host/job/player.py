@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from cdhr_host.drives.link import MachineLink
+from cdhr_host.drives.reference import NEXT_STEP
 from cdhr_host.errors import JobError, MotionError, Problem
 from cdhr_host.job.aside import Aside
 from cdhr_host.job.changes import Changes
@@ -20,6 +21,7 @@ from cdhr_host.pipeline import Staircase
 from cdhr_host.pipeline.course import Course, Stop
 from cdhr_host.pipeline.score import Gain
 from cdhr_host.pipeline.tape import Tape
+from cdhr_host.program.parse import parse_line
 from cdhr_host.units import MM
 from cdhr_host.values import Array, Feedback, Pause, Setpoints
 
@@ -71,6 +73,8 @@ class Player:
         self.executed: tuple[Setpoints, Feedback] | None = None
         """the last batch"""
         self.observers: list[Observer] = []
+        self.referenced = False
+        """whether the drives know where the machine stands"""
         self._adopt()
 
     @property
@@ -95,10 +99,40 @@ class Player:
 
     def _adopt(self) -> None:
         """Take the machine to stand where its drives say; raises MotionError where no pose fits."""
+        self.refer()
+        if not self.referenced:
+            return
         slider = self.link.slider
         if np.abs(slider).max() > REFERENCE:
             self.feeder.slider = slider
             self.staircase.stand_at(*self.staircase.rig.standing(slider))
+
+    def refer(self) -> None:
+        """Ask the drives, once more, whether they know the reference pose."""
+        self.referenced = self.link.referenced
+
+    def home(self) -> None:
+        """Have drives find a reference pose that they do not know, one slider after the other.
+
+        Where the profile's drives are not homed, nothing happens. Raises DriveError.
+        """
+        if self.referenced or self.profile.canopen.reference != "homing":
+            return
+        self.link.home()
+        self.feeder.slider = np.zeros(6)
+        self.staircase.stand_at(np.zeros(3), np.zeros(3))
+        self._adopt()
+
+    def check_referenced(self) -> None:
+        """Raises JobError with the next step where nobody knows where the machine stands."""
+        if not self.referenced:
+            raise JobError(
+                Problem(
+                    "unreferenced",
+                    "the machine is not referenced: nothing may move",
+                    hint=NEXT_STEP[self.profile.canopen.reference],
+                )
+            )
 
     @property
     def pause(self) -> Pause | None:
@@ -210,12 +244,19 @@ class Player:
     def typed(self, text: str) -> bool:
         """Prove a short text, then begin it; whether anything is to move.
 
-        Refused text leaves the machine as it was. Raises ProgramError, MotionError.
+        G28 homes drives that know no reference pose. Refused text leaves the machine as it was.
+        Raises ProgramError, MotionError, JobError, DriveError.
         """
         self.set_aside()
+        if _begins_with_home(text):
+            self.home()
+        before = self.staircase.modal
         course = proven(self.staircase, text)
         if not course.moves():
             return False
+        if not self.referenced:
+            self.staircase.restore(before)
+            self.check_referenced()
         self._play(Kind.TYPED, course, 1.0)
         return True
 
@@ -290,6 +331,12 @@ class Player:
         self.feeder.begin(course, rate, Gain(share, share))
         self.changes.begin(rate)
         self.kind, self._course = kind, course
+
+
+def _begins_with_home(text: str) -> bool:
+    """Whether the first line of a text is G28."""
+    block, _ = parse_line(text.split("\n", 1)[0], 1)
+    return block is not None and block.code == "G28"
 
 
 def _not_homed() -> Problem:

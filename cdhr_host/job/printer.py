@@ -136,6 +136,7 @@ class Printer:
             after(self._state, Word.OPEN)
             if self._acts.busy or self._typed.busy:
                 raise JobError(Problem("busy", "the machine still moves", hint="wait until it stands"))
+            self._acts.player.check_referenced()
             self._say(Word.OPEN, f"printing what {name} sends")
             return self._acts.open(name)
 
@@ -164,6 +165,7 @@ class Printer:
     def emergency_stop(self, reason: str = "") -> None:
         """The link's own stop at once."""
         self._say(Word.FAIL, reason or "emergency stop")
+        self._acts.player.link.interrupt()
         self._ask(self._acts.emergency_stop, first=True)
 
     def acknowledge(self) -> None:
@@ -201,6 +203,7 @@ class Printer:
         with self._lock:
             if self._state not in QUIET:
                 raise JobError(Problem("state", f"no jogging while the printer is {self._state.value}"))
+        self._acts.player.check_referenced()
         if speed.shape != (3,) or not np.isfinite(speed).all():
             raise JobError(Problem("jog", f"a jog needs three finite speeds, not {velocity}"))
         self._ask(lambda: self._jogging.ask(speed))

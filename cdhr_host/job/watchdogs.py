@@ -53,13 +53,14 @@ class Watchdogs:
         self._following = Lasting(profile.watch.following_settling, period)
         self._pressure = Lasting(profile.watch.pressure_settling, period)
         self._before: Array | None = None
+        self._told: Array | None = None
         self._counted = (0.0, 0, 0)
         self._fed = (-math.inf, -1)
 
     def executed(self, rows: Setpoints, feedback: Feedback) -> Alarm | None:
         """N >= 1 executed rows and what was measured at each -> the first thing wrong, if any."""
-        speed = self._speed(rows.slider)
-        return next(self._found(rows, feedback, speed), None)
+        speed, heard = self._speed(rows.slider), self._heard(rows, feedback)
+        return next(self._found(rows[heard], feedback[heard], speed[heard]), None) if heard.any() else None
 
     def cycles(self, now: float, timing: CycleTiming | None) -> Alarm | None:
         """How punctual the sender has been so far, at ``now`` s -> the alarm, if it is too late too often."""
@@ -124,6 +125,18 @@ class Watchdogs:
         self._before = slider[-1:]
         speed: Array = np.abs(np.diff(np.concatenate((before, slider)), axis=0)) / self._period
         return speed
+
+    def _heard(self, rows: Setpoints, feedback: Feedback) -> Flags:
+        """(N,) whether a row tells anything: a link that bears late answers repeats the last one meanwhile.
+
+        Where the setpoints move and nothing at all changes, that is an old answer, and no machine that
+        does not follow. How long answers may be missing is for the link to watch.
+        """
+        now = np.column_stack((rows.slider, feedback.slider, feedback.torque, feedback.pressure))
+        before = now[:1] - 1.0 if self._told is None else self._told
+        self._told = now[-1:]
+        changed = np.diff(np.concatenate((before, now)), axis=0) != 0.0
+        return np.asarray(changed[:, 6:].any(axis=1) | ~changed[:, :6].any(axis=1))
 
     def _found(self, rows: Setpoints, feedback: Feedback, speed: Array) -> Iterator[Alarm]:
         watch = self._watch

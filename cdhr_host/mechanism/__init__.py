@@ -17,6 +17,7 @@ from cdhr_host.mechanism.dynamics import (
     tension_slopes,
     tension_stiffness,
 )
+from cdhr_host.mechanism.force_room import Swings, swings
 from cdhr_host.mechanism.forward import forward, mistaken_error, model_errors, uncompensated_error
 from cdhr_host.mechanism.frequencies import elastic_frequencies, swinging_frequencies
 from cdhr_host.mechanism.kinematics import jacobian, lengths, reachable, slider, uncompensated_lengths
@@ -52,6 +53,7 @@ __all__ = [
     "Printable",
     "Response",
     "Shares",
+    "Swings",
     "UpperBounds",
     "UpperMotion",
     "Windows",
@@ -82,6 +84,7 @@ __all__ = [
     "stretch_doubt",
     "stretched_forward",
     "swinging_frequencies",
+    "swings",
     "tension_slopes",
     "tension_stiffness",
     "tensions",

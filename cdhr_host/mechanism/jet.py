@@ -1,6 +1,9 @@
-"""Quantities along a motion: value, rate and second derivative, carried through sums and products."""
+"""Quantities along a motion: value, rate and second derivative, carried through sums and products.
 
-from typing import NamedTuple
+Where nothing but the values is wanted, ``Plain`` carries these alone through the same formulas.
+"""
+
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -45,7 +48,37 @@ class Jet(NamedTuple):
         )
 
 
-def constant(value: float, like: Jet) -> Jet:
+class Plain(NamedTuple):
+    """Values only, as a Jet has them."""
+
+    value: Array
+
+    def plus(self, other: "Plain") -> "Plain":
+        """Sum."""
+        return Plain(self.value + other.value)
+
+    def times(self, other: "Plain") -> "Plain":
+        """Product."""
+        return Plain(self.value * other.value)
+
+    def scaled(self, factor: float) -> "Plain":
+        """Times a constant."""
+        return Plain(self.value * factor)
+
+    def shifted(self, constant: float) -> "Plain":
+        """Plus a constant."""
+        return Plain(self.value + constant)
+
+    def inverse_root(self) -> "Plain":
+        """To the power of -1/2."""
+        return Plain(1.0 / np.sqrt(self.value))
+
+
+Along = TypeVar("Along", Jet, Plain)
+"""With derivatives or without."""
+
+
+def constant(value: float, like: Along) -> Along:
     """The same number at every instant of ``like``."""
     still = np.zeros_like(like.value)
-    return Jet(still + value, still, still)
+    return type(like)(still + value, *([still] * (len(like) - 1)))

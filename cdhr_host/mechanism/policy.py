@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from cdhr_host.mechanism.cables import Cables, Loads
-from cdhr_host.mechanism.jet import Jet
+from cdhr_host.mechanism.jet import Along
 from cdhr_host.mechanism.kinematics import block_rows, components
 from cdhr_host.mechanism.pairs import Pairs
 from cdhr_host.mechanism.response import Windows
@@ -62,8 +62,14 @@ class Policy:
 
     def upper(self, lower: Array) -> Array:
         """(N, 3) m -> (N, 3) m: displacement of the upper platform."""
-        still = np.zeros_like(lower)
-        return self.follow(lower, still, still).place
+        if self.field is None:
+            return np.asarray(lower + np.array(self.offset), dtype=np.float64)
+        place = np.empty_like(lower)
+        for rows in block_rows(len(lower)):
+            q = components(lower, rows)
+            for axis, part in enumerate(_offset(self.loads, self.field.at(q))):
+                np.add(q[axis], part.value, out=place[rows, axis])
+        return place
 
     def follow(self, lower: Array, velocity: Array, acceleration: Array) -> UpperMotion:
         """(N, 3) each of the lower platform, m, m/s, m/s² -> UpperMotion, with exact derivatives."""
@@ -100,13 +106,13 @@ class Policy:
         return found
 
 
-def _offset(loads: Loads, spring: tuple[Jet, Jet, Jet]) -> tuple[Jet, Jet, Jet]:
+def _offset(loads: Loads, spring: tuple[Along, Along, Along]) -> tuple[Along, Along, Along]:
     """Upper minus lower displacement: s / k + L0 s / |s| less what is between them at the reference."""
-    x, y, z = spring
+    (x, y, z), (across, beside) = spring, loads.aside
     square = x.times(x).plus(y.times(y)).plus(z.times(z))
     longer = square.inverse_root().scaled(loads.rest_length).shifted(1.0 / loads.stiffness)
-    aside = (x.times(longer).shifted(-loads.aside[0]), y.times(longer).shifted(-loads.aside[1]))
-    return *aside, z.times(longer).shifted(-loads.separation)
+    x, y, z = (part.times(longer) for part in (x, y, z))
+    return x.shifted(-across), y.shifted(-beside), z.shifted(-loads.separation)
 
 
 class _Fitted:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdhr_host.mechanism.jet import Jet, constant
+from cdhr_host.mechanism.jet import Along, Jet, Plain, constant
 from cdhr_host.mechanism.pulley import Vector
 from cdhr_host.values import Array
 
@@ -59,7 +59,17 @@ class SpringField:
 
     def along(self, place: Vector, speed: Vector, change: Vector) -> tuple[Jet, Jet, Jet]:
         """Position, velocity and acceleration of the lower platform -> force, N, with its derivatives."""
-        x, y, z = self.scaled(place, speed, change)
+        x, y, z = (Jet(*parts) for parts in zip(place, speed, change, strict=True))
+        return self._force(x, y, z)
+
+    def at(self, place: Vector) -> tuple[Plain, Plain, Plain]:
+        """The force alone, N, where the lower platform is."""
+        x, y, z = (Plain(part) for part in place)
+        return self._force(x, y, z)
+
+    def _force(self, x: Along, y: Along, z: Along) -> tuple[Along, Along, Along]:
+        """Of the position, scaled to the domain here."""
+        x, y, z = self.scaled(x, y, z)
         radial, turning, vertical = self._sums(x, y, z)
         xx, yy, xy = x.times(x), y.times(y), x.times(y)
         return (
@@ -68,14 +78,13 @@ class SpringField:
             vertical,
         )
 
-    def scaled(self, place: Vector, speed: Vector, change: Vector) -> tuple[Jet, Jet, Jet]:
+    def scaled(self, x: Along, y: Along, z: Along) -> tuple[Along, Along, Along]:
         """X, Y and Z, each about -1 to 1 in the domain."""
-        x, y, z = (Jet(*parts) for parts in zip(place, speed, change, strict=True))
         wide, low, high = self.domain.radius, self.domain.low, self.domain.high
         upright = z.shifted(-0.5 * (high + low)).scaled(2.0 / (high - low))
         return x.scaled(1.0 / wide), y.scaled(1.0 / wide), upright
 
-    def _sums(self, x: Jet, y: Jet, z: Jet) -> tuple[Jet, Jet, Jet]:
+    def _sums(self, x: Along, y: Along, z: Along) -> tuple[Along, Along, Along]:
         """A, B and C."""
         weights = self.coefficients @ np.array(_chebyshev(z)).transpose(1, 0, 2)
         powers = _powers(x, y)
@@ -83,7 +92,7 @@ class SpringField:
         for monomials in PARTS:
             total = constant(0.0, x)
             for power in monomials:
-                total = total.plus(powers[power].times(Jet(*weights[:, row])))
+                total = total.plus(powers[power].times(type(x)(*weights[:, row])))
                 row += 1
             parts.append(total)
         return parts[0], parts[1], parts[2]
@@ -92,9 +101,8 @@ class SpringField:
 def basis(domain: Domain, place: Vector) -> Array:
     """(N, 3, ROWS * (RISE + 1)): the force for a unit of each coefficient."""
     still = np.zeros_like(place[0])
-    none = still, still, still
-    x, y, z = SpringField(domain, np.zeros((ROWS, RISE + 1))).scaled(place, none, none)
-    powers, heights = _powers(x, y), np.array([jet.value for jet in _chebyshev(z)])
+    x, y, z = SpringField(domain, np.zeros((ROWS, RISE + 1))).scaled(*(Plain(part) for part in place))
+    powers, heights = _powers(x, y), np.array([part.value for part in _chebyshev(z)])
     X, Y = x.value, y.value
     frames = ((X, Y, still), (X * X - Y * Y, -2.0 * X * Y, still), (still, still, still + 1.0))
     found = [
@@ -105,7 +113,7 @@ def basis(domain: Domain, place: Vector) -> Array:
     return np.ascontiguousarray(np.concatenate(found).transpose(2, 1, 0))
 
 
-def _powers(x: Jet, y: Jet) -> dict[tuple[int, int], Jet]:
+def _powers(x: Along, y: Along) -> dict[tuple[int, int], Along]:
     """All monomials of PARTS."""
     xx, yy = x.times(x), y.times(y)
     square, cube = xx.plus(yy), x.times(xx.plus(yy.scaled(-3.0)))
@@ -115,7 +123,7 @@ def _powers(x: Jet, y: Jet) -> dict[tuple[int, int], Jet]:
     return found
 
 
-def _chebyshev(z: Jet) -> list[Jet]:
+def _chebyshev(z: Along) -> list[Along]:
     """T_0 to T_RISE."""
     found = [constant(1.0, z), z]
     for _ in range(RISE - 1):

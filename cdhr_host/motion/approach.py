@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdhr_host.motion.room import norms
+from cdhr_host.motion.beside import norms
 from cdhr_host.values import Array, Flags, Ints
 
 SHARP = 0.25

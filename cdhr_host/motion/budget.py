@@ -76,12 +76,16 @@ class Bends:
         found: Array = np.sqrt(across**2 + 2 * along * j + j**2)
         return found
 
-    def speed(self, share: float, limits: MotionLimits) -> Array:
-        """(K,) m/s: greatest s' when this share of the limits goes to changing it; infinite if straight."""
-        a, j = share * limits.acceleration, share * limits.jerk
+    def speed(self, share: float, limits: MotionLimits, room: Array) -> Array:
+        """(K,) m/s: greatest s' when this share of the limits goes to changing it; infinite if straight.
+
+        ``room`` (K,) of the acceleration is what the cables leave of it.
+        """
+        most = room * limits.acceleration
+        a, j = share * most, share * room * limits.jerk
         with np.errstate(divide="ignore", invalid="ignore"):
             slow = self.along_second * a
-            left = limits.acceleration**2 - a**2
+            left = most**2 - a**2
             by_acceleration = np.sqrt(left / (slow + np.sqrt(slow**2 + self.second**2 * left)))
             rest = np.sqrt(limits.jerk**2 - j**2)
             v = np.fmin(np.cbrt(rest / self.third), rest / (3 * self.second * a))
@@ -89,7 +93,7 @@ class Bends:
                 v = v - self._excess(v, a, j, rest)
         return np.asarray(np.fmin(by_acceleration, v), dtype=np.float64)
 
-    def _excess(self, v: Array, a: float, j: float, rest: float) -> Array:
+    def _excess(self, v: Array, a: Array, j: Array, rest: Array) -> Array:
         """(K,) m/s: Newton's step down to where the jerk is at its limit."""
         across, turned = self.third * v**2, 3 * self.second * a
         along, drawn = self.along_third * v**2, 3 * self.along_second * a
@@ -99,22 +103,25 @@ class Bends:
         return np.asarray(value / slope, dtype=np.float64)
 
 
-def shares(cap: Array, bends: Bends, long: Flags, braked: Flags, limits: MotionLimits) -> tuple[Array, Array]:
+def shares(  # noqa: PLR0917 -- a column each
+    cap: Array, room: Array, bends: Bends, long: Flags, braked: Flags, limits: MotionLimits
+) -> tuple[Array, Array]:
     """(K,) m/s: speed, and share of the limits that may be spent on changing it, of each stretch.
 
-    ``long`` stretches must let the speed change. Corners that are braked into (``braked``)
-    have their change of speed in their path.
+    ``room`` (K,) of the acceleration is what the cables leave of it. ``long`` stretches must let the
+    speed change. Corners that are braked into (``braked``) have their change of speed in their path.
     """
     straight = bends.second == 0
-    steady = np.minimum(cap, bends.speed(0.0, limits))
+    steady = np.minimum(cap, bends.speed(0.0, limits, room))
     speed, share = steady, np.where(straight, 1.0, 0.0)
     enough = np.where(long & (steady < cap), TURNING, NEARLY) * steady
     undecided = np.flatnonzero(~straight & ~braked)
     for candidate in SHARES:
-        reached = np.minimum(cap[undecided], bends.only(undecided).speed(candidate, limits))
+        some = bends.only(undecided).speed(candidate, limits, room[undecided])
+        reached = np.minimum(cap[undecided], some)
         good = reached >= enough[undecided]
         if candidate == SHARES[-1]:
             good |= long[undecided]
         speed[undecided[good]], share[undecided[good]] = reached[good], candidate
         undecided = undecided[~good]
-    return speed, share
+    return speed, share * room

@@ -25,6 +25,8 @@ ALIKE = 0.85, 0.2
 """Speeds and shares of cells that may become one are within these parts of each other."""
 MERGE = 0.1
 """m, cells are merged up to this length, so that a long path has borders to stop at."""
+LASTING = 1.0
+"""s, and up to what is passed in this time, so that a slow one has them as often."""
 FREE = 0.6
 """A bend that leaves this share of the limits to changing speed goes together with its neighbours."""
 SHORT = 0.01
@@ -79,6 +81,8 @@ class _Stretches:
     """m/s"""
     spend: Array
     """share of acceleration and jerk that the air leaves for changing speed"""
+    room: Array
+    """share of the acceleration that the cables leave"""
     bends: Bends
     bent: Flags
     brake: Array
@@ -99,35 +103,36 @@ def cells(
     span: tuple[float, float],
     limits: MotionLimits,
     *,
-    share: Array,
+    share: tuple[Array, Array],
     passed: float,
     long: tuple[bool, bool],
 ) -> Cells:
     """Cells of a path over a span of s.
 
-    ``feed`` (K,) m/s is the speed wanted on each piece, ``share`` (K,) of acceleration and jerk
-    what the air leaves for changing it; ``long`` says whether a bend at the beginning or the end of
-    the span counts as long in any case: it was begun earlier, or the nozzle rests there. A leg is divided
-    where its length, of which ``passed`` (m) lies before s = 0, is a multiple of a cell's; so it is
-    divided alike whenever it is planned again, and what could be braked from a border still can.
+    ``feed`` (K,) m/s is the speed wanted on each piece; the first ``share`` (K,) is what the air leaves of
+    acceleration and jerk for changing it, the second what the cables leave of the acceleration;
+    ``long`` says whether a bend at the beginning or the end of the span counts as long in any case: it
+    was begun earlier, or the nozzle rests there. A leg is divided where its length, of which ``passed`` (m)
+    lies before s = 0, is a multiple of a cell's; so it is divided alike whenever it is planned again, and
+    what could be braked from a border still can.
     """
     h = limits.half_width
-    pieces = _between(path, (np.minimum(feed, limits.speed), share), span, h, long)
+    pieces = _between(path, (np.minimum(feed, limits.speed), *share), span, h, long)
     rows = _rows(pieces, h, passed)
     cap = np.minimum(rows.cap, _pushed_speed(rows, limits))
-    speed, share = shares(cap, rows.bends, rows.long, rows.braked, limits)
-    share = np.minimum(share, rows.spend)
-    heads, settled = _alike(rows, speed, share, h, passed)
+    speed, spent = shares(cap, rows.room, rows.bends, rows.long, rows.braked, limits)
+    spent = np.minimum(spent, rows.spend)
+    heads, settled = _alike(rows, speed, spent, h, passed)
     open_end = bool(rows.bent[-1])
-    rows, speed, share = (
+    rows, speed, spent = (
         _merged(rows, heads),
         np.minimum.reduceat(speed, heads),
-        np.minimum.reduceat(share, heads),
+        np.minimum.reduceat(spent, heads),
     )
-    share, last = _levelled(rows, speed, share, passed)
-    heads = _heads(speed, share, *rows.brake, _multiples(rows.start + passed, MERGE))
-    rows, speed, share = _merged(rows, heads), speed[heads], share[heads]
-    a, j = share * limits.acceleration, share * limits.jerk
+    spent, last = _levelled(rows, speed, spent, passed)
+    heads = _heads(speed, spent, *rows.brake, _multiples(rows.start + passed, _longest(speed)))
+    rows, speed, spent = _merged(rows, heads), speed[heads], spent[heads]
+    a, j = spent * limits.acceleration, spent * limits.jerk
     known = min(settled if open_end else span[1], last)
     return Cells(rows.start, rows.length, speed, a, j, known, rows.long, _pulls(rows.brake))
 
@@ -155,13 +160,13 @@ def _pulls(brake: Array) -> Array:
 
 def _between(
     path: SmoothPath,
-    wanted: tuple[Array, Array],
+    wanted: tuple[Array, Array, Array],
     span: tuple[float, float],
     h: float,
     at_ends: tuple[bool, bool],
 ) -> _Stretches:
-    """The pieces of a path that lie in a span of s, cut at its ends; ``wanted`` are speeds and shares."""
-    feed, share = wanted
+    """The pieces of a path that lie in a span of s, cut at its ends; ``wanted``: speeds, both shares."""
+    feed, share, room = wanted
     ends = np.append(path.start[1:], path.end)
     first = span[0] + min(TOUCHING, (span[1] - span[0]) / 2)
     used = np.flatnonzero((ends > first) & (path.start < span[1]))
@@ -174,16 +179,18 @@ def _between(
     long = bent & (np.add.reduceat(length, heads)[run] > LONG_RUN * h)
     long |= bent & ((at_ends[0] & (run == run[0])) | (at_ends[1] & (run == run[-1])))
     bends = Bends.of(path).only(used)
-    return _Stretches(start, length, feed[used], share[used], bends, bent, brake, run, long & ~braked)
+    return _Stretches(
+        start, length, feed[used], share[used], room[used], bends, bent, brake, run, long & ~braked
+    )
 
 
 def _rows(pieces: _Stretches, h: float, passed: float) -> _Stretches:
     """Pieces together: a short bend is one, a long one many; straights end where the feed changes,
-    and every MERGE."""
+    and every MERGE or LASTING."""
     bent, place = pieces.bent, pieces.start + passed
     part = np.where(pieces.long, _multiples(place, CELL * h), 0.0)
-    fed = _numbered(pieces.cap) + _numbered(pieces.spend)
-    stretch = np.where(bent, 0.0, _multiples(place, MERGE))
+    fed = _numbered(pieces.cap) + _numbered(pieces.spend) + _numbered(pieces.room)
+    stretch = np.where(bent, 0.0, _multiples(place, _longest(pieces.cap)))
     return _merged(pieces, _heads(pieces.run, part, np.where(bent & ~pieces.long, 0, fed), stretch))
 
 
@@ -206,6 +213,7 @@ def _merged(rows: _Stretches, heads: Ints) -> _Stretches:
         np.add.reduceat(rows.length, heads),
         np.minimum.reduceat(rows.cap, heads),
         np.minimum.reduceat(rows.spend, heads),
+        np.minimum.reduceat(rows.room, heads),
         rows.bends.largest(heads),
         rows.bent[heads],
         rows.brake[:, heads],
@@ -222,16 +230,17 @@ def _alike(rows: _Stretches, speed: Array, share: Array, h: float, passed: float
     place = _multiples(rows.start + passed, CELL * h)
     place = np.where(rows.long, place, -1.0 - np.arange(len(place)))
     label = np.arange(len(place), dtype=float)
+    most = np.maximum(_longest(rows.cap) / (CELL * h), 1.0)
     for size in reversed(SIZES):
         heads = _heads(rows.run, np.floor(place / size))
         group = np.repeat(np.arange(len(heads)), np.diff(np.append(heads, len(place))))
         even = np.minimum.reduceat(speed, heads) >= ALIKE[0] * np.maximum.reduceat(speed, heads)
         even &= np.minimum.reduceat(share, heads) >= ALIKE[1] * np.maximum.reduceat(share, heads)
-        even &= rows.long[heads] & (
-            np.minimum.reduceat(rows.cap, heads) == np.maximum.reduceat(rows.cap, heads)
-        )
+        even &= rows.long[heads] & (size <= most[heads])
+        even &= np.minimum.reduceat(rows.cap, heads) == np.maximum.reduceat(rows.cap, heads)
         label = np.where(even[group], heads[group], label)
-    last = _heads(rows.run, np.floor(place / max(SIZES)))[-1]
+    greatest = max((size for size in SIZES if size <= most[-1]), default=1)
+    last = _heads(rows.run, np.floor(place / greatest))[-1]
     return _heads(label), float(rows.start[last])
 
 
@@ -241,7 +250,7 @@ def _levelled(rows: _Stretches, speed: Array, share: Array, passed: float) -> tu
     And where the last row begins, if it may go on.
     """
     free = (share >= FREE) & (rows.bent | (rows.length < SHORT)) & ~rows.braked
-    heads = _heads(free, speed, _multiples(rows.start + passed, MERGE))
+    heads = _heads(free, speed, _multiples(rows.start + passed, _longest(speed)))
     count = np.diff(np.append(heads, len(share)))
     least = np.repeat(np.minimum.reduceat(share, heads), count)
     bent = np.repeat(np.logical_or.reduceat(rows.bent, heads), count)
@@ -249,7 +258,13 @@ def _levelled(rows: _Stretches, speed: Array, share: Array, passed: float) -> tu
     return level, float(rows.start[heads[-1]]) if free[-1] else np.inf
 
 
-def _multiples(length: Array, cell: float) -> Array:
+def _longest(speed: Array) -> Array:
+    """(K,) m/s -> (K,) m that cells may have: MERGE halved until it lasts no longer than LASTING."""
+    halves = np.floor(np.log2(np.maximum(speed * LASTING / MERGE, 2.0**-20)))
+    return MERGE * np.exp2(np.minimum(halves, 0.0))
+
+
+def _multiples(length: Array, cell: Array | float) -> Array:
     """(K,) m, m -> (K,): whole cells before each length; what rounding has put before a border is on it."""
     whole: Array = np.floor((length + TOUCHING) / cell)
     return whole

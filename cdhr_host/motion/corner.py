@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdhr_host.motion.room import APART
+from cdhr_host.motion.beside import APART
 from cdhr_host.values import Array, Flags, Ints
 
 SHARES = np.linspace(-1.0, 1.0, 9)

@@ -13,13 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdhr_host.errors import MotionError, Problem
-from cdhr_host.motion.cells import Cells, cells
 from cdhr_host.motion.approach import reach, straightened
+from cdhr_host.motion.beside import norms, way
+from cdhr_host.motion.cells import Cells, cells
 from cdhr_host.motion.corner import Allowance
 from cdhr_host.motion.flow import FlowLimits
 from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.look_ahead import border_speeds
-from cdhr_host.motion.smooth_path import SmoothPath, norms, smooth
+from cdhr_host.motion.smooth_path import SmoothPath, smooth
 from cdhr_host.motion.time_law import TimeLaw, time_law
 from cdhr_host.units import MM
 from cdhr_host.values import Array, Flags, Ints
@@ -57,6 +58,8 @@ class Segments:
     """(M,) m³ for each metre of path"""
     air: Array
     """(M,) Pa held by air words"""
+    room: Array
+    """(M,) share of the acceleration that the cables leave"""
 
     def __len__(self) -> int:
         return len(self.line)
@@ -75,6 +78,7 @@ class Segments:
             self.feed[first:last],
             self.clay[first:last],
             self.air[first:last],
+            self.room[first:last],
         )
 
     def joined(self, other: "Segments") -> "Segments":
@@ -85,7 +89,17 @@ class Segments:
             np.concatenate((self.feed, other.feed)),
             np.concatenate((self.clay, other.clay)),
             np.concatenate((self.air, other.air)),
+            np.concatenate((self.room, other.room)),
         )
+
+    def divided(self, count: Ints, room: Array) -> "Segments":
+        """Each in (M,) equal parts in a row, with the room (sum(M),) of these."""
+        whole = np.repeat(np.arange(len(self)), count)
+        part = np.arange(len(whole)) - (np.cumsum(count) - count)[whole]
+        start, way = self.points[:-1], np.diff(self.points, axis=0)
+        begins = start[whole] + (part / count[whole])[:, None] * way[whole]
+        points = np.concatenate((begins, self.points[-1:]))
+        return Segments(points, self.line[whole], self.feed[whole], self.clay[whole], self.air[whole], room)
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,7 +189,7 @@ class LegPlanner:
             feed[path.segment],
             span,
             self._limits,
-            share=share[path.segment],
+            share=(share[path.segment], segments.room[path.segment]),
             passed=passed,
             long=(self._inside or self._begin.passed == 0.0, closes),
         )
@@ -195,39 +209,27 @@ class LegPlanner:
         """The smoothed path of what is not forgotten, and the segments as it follows them."""
         h, dropped = self._limits.half_width, self._begin.dropped
         points, spent = straightened(segments.points, segments.feed, h)
-        path = smooth(
-            points,
-            h,
-            passed=dropped,
-            closes=closes,
-            allowed=self._allowed(segments),
-            spent=spent,
-            most=self._room(),
-        )
+        allowed = self._allowed(segments)
+        path = smooth(points, h, passed=dropped, closes=closes, allowed=allowed, spent=spent)
         return path, replace(segments, points=points)
 
-    def _room(self) -> float:
-        """m, way from the greatest speed to rest: no corner needs more."""
-        v, a, j = self._limits.speed, self._limits.acceleration, self._limits.jerk
-        return v * max(v / a + a / j, 2 * math.sqrt(v / j)) / 2
-
-    def _reach(self) -> float:
-        """m of path drawn before and after each place on which the path there depends."""
-        return reach(self._limits.half_width) + 2 * self._room()
+    def _reach(self, speed: float) -> float:
+        """m of path drawn to each side on which the path at a place depends, up to a speed."""
+        limits = self._limits
+        return reach(limits.half_width) + 2 * float(way(np.array(speed), limits.acceleration, limits.jerk))
 
     def _known(self, path: SmoothPath, segments: Segments) -> float:
         """m in s up to which no further drawing changes the path."""
         drawn = np.concatenate(([0.0], np.cumsum(norms(np.diff(segments.points, axis=0)))))
-        point = int(np.searchsorted(drawn, drawn[-1] - self._reach(), side="right")) - 1
-        if point < 0:
-            return -math.inf
-        return float(path.drawn[point] + max(drawn[-1] - self._reach() - drawn[point], 0.0))
+        last = drawn[-1] - self._reach(float(segments.feed.max()))
+        point = int(np.searchsorted(drawn, last, side="right")) - 1
+        return float(path.drawn[point] + last - drawn[point]) if point >= 0 else -math.inf
 
     def _allowed(self, segments: Segments) -> Allowance:
         """As programmed, so that the path is the same with any feed."""
         limits = self._limits
         share = limits.flow.share(segments.feed, segments.clay, limits.acceleration)
-        return Allowance(segments.feed, share, limits.acceleration, limits.jerk)
+        return Allowance(segments.feed, np.minimum(share, segments.room), limits.acceleration, limits.jerk)
 
     def _paces(self, segments: Segments) -> tuple[Array, Array]:
         """(M,) m/s wanted, (M,) share of acceleration and jerk that the air leaves for changing it."""
@@ -242,7 +244,7 @@ class LegPlanner:
         border = float(found.start[count])
         drawn = np.concatenate(([0.0], np.cumsum(norms(np.diff(segments.points, axis=0)))))
         point = int(np.searchsorted(path.drawn, border, side="right")) - 1
-        first = int(np.searchsorted(drawn, drawn[point] - self._reach(), side="right")) - 1
+        first = int(np.searchsorted(drawn, drawn[point] - self._reach(self._limits.speed), side="right")) - 1
         first = max(first, 0)
         self._segments = segments.part(first, len(segments))
         self._planned = len(self._segments)

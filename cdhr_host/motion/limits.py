@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.mechanism import UpperBounds
 from cdhr_host.motion.flow import UNBOUNDED, FlowLimits
+from cdhr_host.motion.room import ALL, AccelerationRoom
 from cdhr_host.motion.shaping import Shaper, shaper
 from cdhr_host.profile import Profile
 from cdhr_host.units import MM
@@ -63,6 +64,8 @@ class MotionLimits:
     """m, the part of every tolerance that input shaping needs"""
     flow: FlowLimits = UNBOUNDED
     """of the air"""
+    room: AccelerationRoom = ALL
+    """what the cables' forces leave of the acceleration"""
 
     @classmethod
     def from_profile(
@@ -96,6 +99,11 @@ class MotionLimits:
             raise MotionError(_too_slow_mode(shaped, profile))
         smoothed = half_width(profile.path.tolerance - shaped)
         return cls(v, a, j, smoothed, profile.path.stop_angle, shaped, flow)
+
+    @property
+    def deviation(self) -> float:
+        """m, the most by which smoothing and input shaping leave the drawn path."""
+        return self.half_width / 3.0 + self.shaped
 
     def within(self, tolerance: float) -> "MotionLimits":
         """The same limits with the smoothing that a tolerance (m) allows."""

@@ -9,11 +9,11 @@ from functools import singledispatchmethod
 import numpy as np
 
 from cdhr_host.motion.arc import chords
+from cdhr_host.motion.beside import norms
 from cdhr_host.motion.curves import points_on
 from cdhr_host.motion.leg import AS_PROGRAMMED, BATCH, FeedOverride, LegPlanner, Segments
 from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.sampling import Stand, Stretch, Timeline
-from cdhr_host.motion.smooth_path import norms
 from cdhr_host.values import (
     Arc,
     Array,
@@ -108,6 +108,7 @@ class Planner:
             command.speed[keep],
             command.clay[keep] / length[keep],
             command.air[keep],
+            np.ones(int(keep.sum())),
         )
         return self._draw(drawn, np.full(len(drawn), self._exact))
 
@@ -159,7 +160,7 @@ class Planner:
             same = np.ones(len(part) - 1)
             line = np.full(len(same), command.line)
             drawn = Segments(
-                part, line, same * command.speed, same * command.clay / whole, same * command.air
+                part, line, same * command.speed, same * command.clay / whole, same * command.air, same
             )
             stops = np.zeros(len(same), dtype=np.bool_)
             stops[0] = self._exact and first == 0
@@ -168,6 +169,7 @@ class Planner:
     def _draw(self, drawn: Segments, stops: Flags) -> Iterator[Stretch]:
         """Add segments to the leg; close it before those in ``stops`` (M,), sharp corners, jumps of flow."""
         flow = self._limits.flow
+        drawn, stops = self._eased(drawn, stops)
         drawn = replace(drawn, feed=flow.feed(np.minimum(drawn.feed, self._limits.speed), drawn.clay))
         steps = np.diff(drawn.points, axis=0)
         direction = steps / norms(steps)[:, None]
@@ -183,6 +185,17 @@ class Planner:
             first = corner
         self._direction, self._clay = direction[-1], float(drawn.clay[-1])
         self._at, self._line = drawn.points[-1], int(drawn.line[-1])
+
+    def _eased(self, drawn: Segments, stops: Flags) -> tuple[Segments, Flags]:
+        """Segments divided where the cables' forces leave less than the usual acceleration; (M,) stops."""
+        limits = self._limits
+        found = limits.room.along(drawn.points, limits.acceleration, limits.deviation)
+        if found is None:
+            return drawn, stops
+        count, room = found
+        divided = np.zeros(len(room), dtype=np.bool_)
+        divided[np.cumsum(count) - count] = stops
+        return drawn.divided(count, room), divided
 
     def _sharp(self, direction: Array) -> Flags:
         """(M,) whether a segment begins with a corner sharper than the stop angle."""

@@ -26,9 +26,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdhr_host.motion.beside import norms, rooms, way
 from cdhr_host.motion.corner import Allowance, Rounding, Widths, roundings
-from cdhr_host.motion.room import norms as norms
-from cdhr_host.motion.room import rooms
 from cdhr_host.values import Array, Flags, Ints
 
 STRAIGHT = 1e-9
@@ -107,7 +106,6 @@ def smooth(
     closes: bool = False,
     allowed: Allowance | None = None,
     spent: Array | None = None,
-    most: float = math.inf,
 ) -> SmoothPath:
     """(M+1, 3) m: the smoothed path of a polyline with M segments of positive length.
 
@@ -115,6 +113,7 @@ def smooth(
     ``closes``, at the last; there the result is the drawn path. Otherwise it is exact only from
     the farthest reach of a kernel after the first point to as much before the last. Pieces begin
     at s = -h. With an allowance, corners that would cost much speed are braked into.
+    ``spent`` (M+1,) m is by how much the ways beside the points were moved already (``motion.approach``).
     """
     steps = np.diff(points, axis=0)
     lengths = norms(steps)
@@ -123,7 +122,8 @@ def smooth(
     corner, turns = _corners(direction)
     ends = np.minimum(passed + drawn[corner], drawn[-1] - drawn[corner] if closes else math.inf)
     own = h - 3.0 * (np.zeros(len(points)) if spent is None else spent)[corner]
-    room = rooms(drawn, corner, norms(turns[1] - turns[0]), _changes(allowed, len(points)), h, most)
+    turned = norms(turns[1] - turns[0])
+    room = rooms(drawn, corner, turned, _changes(allowed, len(points)), h, _needed(allowed, corner))
     rounding = roundings(room, corner, turns, Widths(h, own, ends), allowed)
     saved = np.zeros((2, len(points)))
     saved[:, corner] = rounding.saved
@@ -153,6 +153,14 @@ def _changes(allowed: Allowance | None, count: int) -> Flags:
     if allowed is not None:
         found[1:-1] = (np.diff(allowed.feed) != 0.0) | (np.diff(allowed.share) != 0.0)
     return found
+
+
+def _needed(allowed: Allowance | None, corner: Ints) -> Array:
+    """(K,) m of straight on each side that corners at points (K,) can make use of."""
+    if allowed is None:
+        return np.full(len(corner), math.inf)
+    around = np.maximum(allowed.feed[corner - 1], allowed.feed[np.minimum(corner, len(allowed.feed) - 1)])
+    return way(around, allowed.acceleration, allowed.jerk)
 
 
 def _dot(a: Array, b: Array) -> Array:

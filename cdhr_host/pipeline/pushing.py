@@ -15,9 +15,9 @@ import numpy as np
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.extrusion import AirModel
 from cdhr_host.motion.arc import arc_length
+from cdhr_host.motion.beside import norms
 from cdhr_host.motion.curves import spline_length
 from cdhr_host.motion.flow import FlowLimits
-from cdhr_host.motion.smooth_path import norms
 from cdhr_host.units import KPA, MM, MM3
 from cdhr_host.values import Arc, Array, Command, Ints, Moves, Notice, Prime, Spline
 
@@ -86,6 +86,13 @@ def lays(command: Command) -> bool:
     if isinstance(command, Arc | Spline):
         return command.clay > 0.0 or command.air > 0.0
     return isinstance(command, Prime)
+
+
+def first_flow(command: Command, air: AirModel, speed_max: float) -> float:
+    """m³/s with which a command begins to lay, as far as the air can; ``speed_max`` m/s is the nozzle's."""
+    flow = _flows(command, speed_max)[1]
+    laid = flow[flow > 0.0]
+    return float(min(laid[0], air.flow_max)) if len(laid) else 0.0
 
 
 class Pushing:

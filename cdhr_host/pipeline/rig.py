@@ -1,6 +1,6 @@
 """The machine as the staircase sees it: nozzle motion in, both platforms, cables and forces out."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from cdhr_host.extrusion import AirModel
 from cdhr_host.mechanism import (
@@ -11,6 +11,7 @@ from cdhr_host.mechanism import (
     Policy,
     UpperBounds,
     UpperMotion,
+    Windows,
     cable_state,
     direction_change_bound,
     forward,
@@ -18,10 +19,12 @@ from cdhr_host.mechanism import (
     nine_tensions,
     slider,
     stretched_forward,
+    swings,
     tensions,
     upper_bounds,
 )
-from cdhr_host.motion.limits import MotionLimits
+from cdhr_host.motion.limits import MotionLimits, profile_shaper
+from cdhr_host.motion.room import AccelerationRoom
 from cdhr_host.pipeline.pushing import flow_limits
 from cdhr_host.profile import Profile
 from cdhr_host.values import Array, CableState, ToolTrack
@@ -42,28 +45,32 @@ class Rig:
     give: Give | None
     """the cables' stretch, where setpoints allow for it"""
     air: AirModel
+    room: AccelerationRoom
+    """for the nozzle's acceleration, that the force windows leave"""
 
     @classmethod
     def from_profile(cls, profile: Profile) -> "Rig":
         """Fits the spring policy, which may take half a second the first time."""
         policy = Policy.from_profile(profile)
+        parts = Cables.from_profile(profile), Loads.from_profile(profile), Pairs.from_profile(profile)
+        upper = upper_bounds(profile, policy)
         return cls(
             profile,
-            Cables.from_profile(profile),
-            Loads.from_profile(profile),
-            Pairs.from_profile(profile),
+            *parts,
             policy,
-            upper_bounds(profile, policy),
+            upper,
             direction_change_bound(profile),
             Give.from_profile(profile) if profile.stretch.compensation == "on" else None,
             AirModel.from_profile(profile),
+            _room(profile, parts, policy, upper),
         )
 
     def limits(self) -> MotionLimits:
         """Limits of the nozzle that keep those of the sliders; raises MotionError where there are none."""
         limits = self.profile.limits
         flow = flow_limits(self.air, limits.jerk_max / limits.acceleration_max)
-        return MotionLimits.from_profile(self.profile, self.bend, self.upper, flow)
+        found = MotionLimits.from_profile(self.profile, self.bend, self.upper, flow)
+        return replace(found, room=self.room)
 
     def follow(self, track: ToolTrack) -> tuple[Array, UpperMotion]:
         """(N, 3) m, the nozzle platform's displacement, and the upper platform's motion."""
@@ -106,8 +113,10 @@ class Rig:
 
     def slider_places(self, track: ToolTrack) -> Array:
         """(N, 6) m: as ``sliders``, with no more worked out than that needs."""
-        _, upper = self.follow(track)
-        return self.shifted_sliders(track, upper)
+        if self.give is not None:
+            return self.shifted_sliders(track, self.follow(track)[1])
+        q = track.position_G - self.cables.reference_G
+        return slider(self.cables, lengths(self.cables, q, self.policy.upper(q)))
 
     def shifted_sliders(self, track: ToolTrack, upper: UpperMotion) -> Array:
         """The same for an upper platform with a motion of its own."""
@@ -117,3 +126,17 @@ class Rig:
             return slider(self.cables, length)
         motion = track.acceleration, upper.acceleration
         return self.sliders(length, tensions(self.cables, self.loads, q, upper.place, *motion))
+
+
+def _room(
+    profile: Profile, parts: tuple[Cables, Loads, Pairs], policy: Policy, upper: UpperBounds
+) -> AccelerationRoom:
+    """For the nozzle's acceleration, anywhere on the bed."""
+    (cables, loads, pairs), windows, speed = parts, Windows.from_profile(profile), profile.limits.speed_max
+
+    def measure(places_G: Array) -> Array:
+        q = places_G - cables.reference_G
+        return swings(cables, loads, pairs, q, policy.upper(q)).room(windows, upper, speed)
+
+    lag = speed * profile_shaper(profile).length / 2.0
+    return AccelerationRoom(profile.bed.radius, profile.bed.height, lag, measure)

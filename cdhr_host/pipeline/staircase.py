@@ -16,14 +16,14 @@ from cdhr_host.motion.sampling import Stand, Timed, Timeline
 from cdhr_host.motion.shaping import Shaper
 from cdhr_host.pipeline.audit import Audit, on_bed
 from cdhr_host.pipeline.checked import Checked
-from cdhr_host.pipeline.drying import Layers, lifted, paused
+from cdhr_host.pipeline.drying import Layers, Parking, paused
 from cdhr_host.pipeline.leading import Leading
-from cdhr_host.pipeline.pushing import Pushing, lays
+from cdhr_host.pipeline.pushing import Pushing, first_flow, lays
 from cdhr_host.pipeline.rig import Rig
 from cdhr_host.pipeline.shift import SAME, Shift, nozzle_moving, nozzle_standing, shift
 from cdhr_host.profile import Profile
 from cdhr_host.program import Interpreter, Modal
-from cdhr_host.values import Array, Command, Moves, Notice, Pause, Setpoints, ToolTrack
+from cdhr_host.values import Array, Command, Notice, Pause, Setpoints, ToolTrack
 
 __all__ = ["Checked", "Staircase"]
 
@@ -47,7 +47,8 @@ class Staircase:
         self._offset = np.zeros(3)
         self._airless_since: int | None = 0
         self._layers = Layers(profile.job.layer_time_min)
-        self._way_down: Moves | None = None
+        self._parking = Parking(profile)
+        self._primes = False
 
     @property
     def lines(self) -> int:
@@ -106,10 +107,10 @@ class Staircase:
 
     def settled(self, command: Command) -> Iterator[Timed]:
         """Stretches that a further command settles; all there are before a Pause."""
-        if self._way_down is not None and not isinstance(command, Notice):
+        if self._parking.away and not isinstance(command, Notice):
             yield from self._lowered()
-        if self._airless_since is not None and lays(command):
-            yield from self._awaited()
+        if lays(command):
+            yield from self._readied(command)
         if isinstance(command, Pause):
             yield from self._raised(command.line)
         for stretch in self._planner.stretches(command):
@@ -117,6 +118,7 @@ class Staircase:
         if isinstance(command, Pause):
             yield self._timeline.rest(self._planner.standing)
             self._airless_since = self.tick
+            self._primes = True
         yield from self._dried(command)
 
     def _dried(self, command: Command) -> Iterator[Timed]:
@@ -134,21 +136,18 @@ class Staircase:
             yield from self._lowered()
 
     def _raised(self, line: int) -> Iterator[Timed]:
-        """Go up from where the nozzle stands, if pauses lift."""
+        """Away from where the nozzle stands, if pauses lift or park."""
         yield from self._brought_to_rest()
-        way = lifted(self._planner.standing.at_G, self.profile, line)
-        if way is not None and self._way_down is None:
-            up, self._way_down = way
-            for stretch in self._planner.stretches(up):
+        if (way := self._parking.leave(self._planner.standing.at_G, line)) is not None:
+            for stretch in self._planner.stretches(way):
                 yield self._timeline.lay(stretch)
 
     def _lowered(self) -> Iterator[Timed]:
-        """Back down to where it was raised."""
-        if self._way_down is not None:
+        """Back to where it was."""
+        if (way := self._parking.come_back()) is not None:
             yield from self._brought_to_rest()
-            for stretch in self._planner.stretches(self._way_down):
+            for stretch in self._planner.stretches(way):
                 yield self._timeline.lay(stretch)
-            self._way_down = None
             yield from self._brought_to_rest()
 
     def _brought_to_rest(self) -> Iterator[Timed]:
@@ -164,6 +163,21 @@ class Staircase:
         """Stretches that all commands so far settle, without waiting for more of them."""
         for stretch in self._planner.advance():
             yield self._timeline.lay(stretch)
+
+    def _readied(self, command: Command) -> Iterator[Timed]:
+        """What comes before clay is laid again: the air, and after a pause the clay for the nozzle."""
+        self._parking.note(command)
+        if self._airless_since is not None:
+            yield from self._awaited()
+        if self._primes and self.profile.job.resume_prime:
+            yield from self._brought_to_rest()
+            standing, flow = (
+                self._planner.standing,
+                first_flow(command, self.rig.air, self.profile.limits.speed_max),
+            )
+            prime = Stand(standing.at_G, self.profile.job.resume_prime, flow, standing.line, standing.number)
+            yield self._timeline.lay(prime)
+        self._primes = False
 
     def _awaited(self) -> Iterator[Timed]:
         """Stand before the first clay for as long as the air needs to be ready for it."""
@@ -203,7 +217,7 @@ class Staircase:
         """
         other = copy.copy(self)
         other._planner, other._timeline = self._planner.fork(override), copy.copy(self._timeline)
-        other._layers = copy.copy(self._layers)
+        other._layers, other._parking = copy.copy(self._layers), copy.copy(self._parking)
         return other
 
     def restore(self, modal: Modal) -> None:

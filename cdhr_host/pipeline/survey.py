@@ -16,7 +16,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from cdhr_host.mechanism import affine_nine_tensions
+from cdhr_host.mechanism import swings
 from cdhr_host.motion.bounds import LegBounds, leg_bounds
 from cdhr_host.motion.leg import Leg
 from cdhr_host.motion.sampling import BLOCK, Stand, Timed
@@ -87,22 +87,14 @@ class Survey:
         """(N,) whether forces and travel are proven between here and a neighbour that is certain too."""
         rig = self._rig
         q, upper = rig.follow(track)
-        rest, below, above = _affine(rig, q, upper.place)
+        forces = swings(rig.cables, rig.loads, rig.pairs, q, upper.place)
         hard = rig.upper.slope * found.acceleration + rig.upper.bend * found.speed**2
-        swing = np.hstack((_row_norms(below) * found.acceleration, _row_norms(above) * hard))
-        pulled = (rest - swing >= self._least) & (rest + swing <= self._greatest)
+        swing = forces.by(found.acceleration, hard)
+        pulled = (forces.rest - swing >= self._least) & (forces.rest + swing <= self._greatest)
         travel, sliders = rig.slider_places(track), self._profile.sliders
         margin = rig.upper.slope * SPACING
         held = (travel >= sliders.travel_min + margin) & (travel <= sliders.travel_max - margin)
         return np.asarray(pulled.all(axis=1) & held.all(axis=1), dtype=np.bool_)
-
-
-def _affine(rig: Rig, q: Array, place: Array) -> tuple[Array, Array, Array]:
-    """Pairs, single cables, upper cables: resting forces (N, 12), gains (N, 9, 3) and (N, 3, 3)."""
-    nine = affine_nine_tensions(rig.cables, rig.loads, rig.pairs, q, place)
-    rest = np.hstack((nine.rest[:, :3] + nine.rest[:, 3:6], nine.rest))
-    below = np.concatenate((nine.lower[:, :3] + nine.lower[:, 3:], nine.lower), axis=1)
-    return rest, below, nine.upper
 
 
 def force_slope(rig: Rig) -> float:
@@ -122,13 +114,7 @@ def force_slope(rig: Rig) -> float:
 
 def _resting(rig: Rig, q: Array) -> Array:
     """(N, 3) m -> (N, 12) N."""
-    return _affine(rig, q, rig.policy.upper(q))[0]
-
-
-def _row_norms(gain: Array) -> Array:
-    """(N, K, 3) -> (N, K)."""
-    norms: Array = np.sqrt(np.einsum("nij,nij->ni", gain, gain))
-    return norms
+    return swings(rig.cables, rig.loads, rig.pairs, q, rig.policy.upper(q)).rest
 
 
 def _refined(coarse: Ints, proven: Flags) -> Ints:

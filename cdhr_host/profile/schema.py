@@ -167,7 +167,12 @@ class Job(Section):
     ] = "clean"
     resume_prime: Annotated[
         float,
-        key("resume_prime_ms", "clay pushed while standing before a held bead goes on", ge=0, le=6e4),
+        key(
+            "resume_prime_ms",
+            "clay pushed while standing before a held bead goes on, and after a pause",
+            ge=0,
+            le=6e4,
+        ),
         IN_MS,
     ] = 0.0
     lift: Annotated[
@@ -178,6 +183,12 @@ class Job(Section):
     pauses_lift: Annotated[
         bool, Field(description="the nozzle goes up by lift_mm for pauses and between layers that dry")
     ] = False
+    pauses_park: Annotated[
+        bool,
+        Field(description="with pauses_lift: it goes to the park place too, lift_mm above all clay"),
+    ] = False
+    park_x: Annotated[float, key("park_x_mm", "where it waits, program x", ge=-1e5, le=1e5), IN_MM] = 0.0
+    park_y: Annotated[float, key("park_y_mm", "where it waits, program y", ge=-1e5, le=1e5), IN_MM] = 0.0
     pause_every_layers: Annotated[
         int,
         Field(description="layers after which a print pauses for an operator; 0 is never", ge=0, le=10_000),

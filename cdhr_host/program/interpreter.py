@@ -75,6 +75,12 @@ class Interpreter:
         self.modal = run.modal
 
 
+def plain(line: str) -> Row | None:
+    """The row of a G0 or G1 as slicers write it, without its line end; None for any other line."""
+    found = _LINE.fullmatch(f"{line}\n")
+    return found.groups("") if found is not None and found[1] else None
+
+
 def _read(run: Run, chunks: Iterable[bytes]) -> Iterator[Command]:
     """Commands until the first problem; the run holds problems and modal state."""
     seen = False

@@ -45,6 +45,15 @@ def pause(run: Run, block: Block) -> None:
     run.emit(Pause(block.line, block.text or block.code))
 
 
+def change(run: Run, block: Block) -> None:
+    """M600, M601: where the nozzle waits, and how, is the profile's."""
+    if block.words:
+        letters = " ".join(word.letter for word in block.words)
+        text = f"{block.code}: {letters} ignored, where the nozzle waits comes from [job] of the profile"
+        run.warn(block.code, block.line, text)
+    run.emit(Pause(block.line, "M600: change the clay" if block.code == "M600" else block.code))
+
+
 def end(run: Run, block: Block) -> None:
     """M2, M30."""
     if block.text:

@@ -129,6 +129,10 @@ _TABLE: Final = (
     KnownWord("M380", "S", "opens the air as [air] solenoid_words says", air.output),
     KnownWord("M381", "S", "closes what M380 opened", air.output),
     KnownWord("M400", "", "exact stop", waits.stop),
+    KnownWord(
+        "M600", "BELRTUXYZ", "pause to change the clay; the nozzle waits where [job] says", waits.change
+    ),
+    KnownWord("M601", "XYZ", "pause; the nozzle waits where [job] says", waits.change),
     KnownWord("T0", "", "the only nozzle", waits.nothing),
 )
 

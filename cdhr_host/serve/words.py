@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from cdhr_host.program.block import Block
+from cdhr_host.program.interpreter import plain
 from cdhr_host.program.parse import parse_line
+from cdhr_host.program.straight import Row
 from cdhr_host.program.words import WORDS
 from cdhr_host.units import INCH, MINUTE, MM
 
@@ -72,6 +74,9 @@ class Modes:
 
     def after(self, line: str) -> "Modes":
         """The modes once this line has been read."""
+        row = plain(line)
+        if row is not None:
+            return self._passed(row)
         simple = _SWITCHES.get(code_of(line))
         if simple is not None:
             return replace(self, **simple)
@@ -79,6 +84,20 @@ class Modes:
             return self
         block, _ = parse_line(line, 1)
         return self._moved(block) if block else self
+
+    def _passed(self, row: Row) -> "Modes":
+        """After a line as slicers write it, which is nearly every one."""
+        feed, e = row[1] or row[7], row[6]
+        if not feed and not e:
+            return self
+        before = 0.0 if e and self.absolute_e else self.e
+        return Modes(
+            self.absolute,
+            self.absolute_e,
+            self.inches,
+            float(feed) if feed else self.feed,
+            before + float(e or 0.0),
+        )
 
     def _moved(self, block: Block) -> "Modes":
         named = "E" in block or (block.code == "G92" and not block.words)

@@ -12,7 +12,7 @@ from typing import Self
 
 ROOT = Path(__file__).parents[2]
 TMUX = shutil.which("tmux")
-PATIENCE = 90.0
+PATIENCE = 150.0
 """s until something that should happen is given up"""
 LOOK = 0.1
 

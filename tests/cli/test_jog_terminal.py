@@ -12,9 +12,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from pseudo import Pseudo
 from terminal import ROOT, TMUX, Terminal, until
 
-pytestmark = pytest.mark.skipif(TMUX is None, reason="tmux is not installed")
+tmux = pytest.mark.skipif(TMUX is None, reason="tmux is not installed")
 
 
 @contextmanager
@@ -60,15 +61,13 @@ def driven(terminal: Terminal) -> None:
     terminal.shows("nozzle X    2.000 Y    1.000 Z    1.000 mm", "ok X:2.000 Y:1.000 Z:1.000")
     terminal.keys("-", "Left")
     terminal.shows("nozzle X    1.900 Y    1.000 Z    1.000 mm", "step 0.1 mm")
-    terminal.keys(":")
-    terminal.shows("G-code:")
-    terminal.type("G1 X5 Y-3 F1200")
-    terminal.keys("Enter")
+    terminal.type(":G1 X5 Y-3 F1200\r")
     terminal.shows("nozzle X    5.000 Y   -3.000 Z    1.000 mm", "> G1 X5 Y-3 F1200")
     terminal.keys("h")
     terminal.shows("ok X:0.000 Y:0.000 Z:0.000")
 
 
+@tmux
 def test_over_loopback(tmp_path: Path) -> None:
     with Terminal(tmp_path, ["jog"]) as terminal:
         driven(terminal)
@@ -79,22 +78,25 @@ def test_over_loopback(tmp_path: Path) -> None:
         assert terminal.code == 0
 
 
+@tmux
 def test_over_a_serial_adapter(tmp_path: Path) -> None:
     with far_side(tmp_path) as url, Terminal(tmp_path, ["jog", "--drives", url]) as terminal:
         driven(terminal)
+        terminal.keys("c", *["Right"] * 10)
+        terminal.shows("hold a key")
+        until(lambda: "nozzle X    0.000" not in terminal.screen, lambda: terminal.screen)
+        terminal.shows("  0.0 mm/s")
         terminal.keys("q")
         assert terminal.code == 0
         assert "leaked" not in terminal.screen
         assert "Traceback" not in terminal.screen
 
 
+@tmux
 def test_ctrl_c_holds_and_stays(tmp_path: Path) -> None:
     with Terminal(tmp_path, ["jog"]) as terminal:
         terminal.shows("IDLE")
-        terminal.keys(":")
-        terminal.shows("G-code:")
-        terminal.type("G1 X80 F300")
-        terminal.keys("Enter")
+        terminal.type(":G1 X80 F300\r")
         terminal.shows("> G1 X80 F300")
         until(lambda: "nozzle X    0.000" not in terminal.screen, lambda: terminal.screen)
         terminal.keys("C-c")
@@ -105,13 +107,11 @@ def test_ctrl_c_holds_and_stays(tmp_path: Path) -> None:
         assert terminal.code == 0
 
 
+@tmux
 def test_a_terminal_that_is_gone_brings_the_machine_to_rest(tmp_path: Path) -> None:
     with far_side(tmp_path) as url, Terminal(tmp_path, ["jog", "--drives", url]) as terminal:
         terminal.shows("IDLE", "referenced")
-        terminal.keys(":")
-        terminal.shows("G-code:")
-        terminal.type("G1 X120 F600")
-        terminal.keys("Enter")
+        terminal.type(":G1 X120 F600\r")
         until(lambda: "nozzle X    0.000" not in terminal.screen, lambda: terminal.screen)
         process = terminal.process
         terminal.close()
@@ -120,3 +120,23 @@ def test_a_terminal_that_is_gone_brings_the_machine_to_rest(tmp_path: Path) -> N
     assert len(places) > 2
     assert places[-1][1:7] == places[-20][1:7]
     assert places[-1][1:7] != places[1][1:7]
+
+
+def test_a_terminal_that_stalls_and_closes_ends_it(tmp_path: Path) -> None:
+    """As a dropped SSH connection: nothing drawn is taken any more, then the other side is closed."""
+    with Pseudo(tmp_path, ["jog"]) as terminal:
+        terminal.shows("? shows what the keys do")
+        terminal.type("?" * 200)
+        terminal.stalls()
+        terminal.close()
+        assert terminal.code == 130
+
+
+def test_a_terminal_that_closes_without_a_word_ends_it(tmp_path: Path) -> None:
+    """Without SIGHUP: the terminal is not the controlling one."""
+    with Pseudo(tmp_path, ["jog"], controlling=False) as terminal:
+        terminal.shows("? shows what the keys do")
+        terminal.type("!")
+        terminal.shows("FAULT")
+        terminal.close()
+        assert terminal.code == 130

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hands import Hands, run
+from stepped import Stepped
 from textual.events import AppBlur
 
 from cdhr_host.console.desk import Desk
@@ -32,26 +33,13 @@ STILL = 1e-4
 """m/s, of the last tick of a way, which ends between two ticks"""
 
 
-class Stepped:
-    """A clock that goes when it is told to."""
-
-    speed = 1.0
-
-    def __init__(self) -> None:
-        self._now = 0.0
-
-    def now(self) -> float:
-        return self._now
-
-    def wait_until(self, when: float) -> None:
-        self._now = max(self._now, when)
-
-
 class Bench(Hands):
     """A desk whose machine moves only while the test lets time pass."""
 
     rows: list[Setpoints]
     clock: Stepped
+    renewed: float
+    """s of the clock, of the last press"""
 
     def go(self, duration: float) -> None:
         end = self.clock.now() + duration
@@ -65,6 +53,7 @@ class Bench(Hands):
         end = self.clock.now() + duration
         while self.clock.now() < end - CLOSE:
             await self.press(key)
+            self.renewed = self.clock.now()
             self.go(REPEAT)
 
     @property
@@ -82,20 +71,21 @@ class Bench(Hands):
         jerk = np.linalg.norm(np.diff(self.done.nozzle_G, 3, axis=0), axis=1).max() / PERIOD**3
         assert jerk <= PAPER.limits.jerk_max * 1.006
 
-    def stopped_within(self, since: int) -> None:
-        """At rest a lease and a stop after the row ``since``, and not at once."""
-        going = np.flatnonzero(self.speed > STILL)
-        assert len(going)
-        taken = (int(going[-1]) - since) * PERIOD
-        assert taken <= LEASE + stop_time(float(self.speed[since]))
+    def stops(self, latest: float) -> None:
+        """The stop begins by ``latest``, s of the clock, and is one jerk-limited ramp down to rest."""
+        at, speed = self.done.tick * PERIOD, self.speed
+        fast = float(speed.max())
+        begun = at[speed > fast * (1 - CLOSE)][-1]
+        rest = at[speed > STILL][-1]
+        assert begun <= latest
+        assert rest - begun <= 1.3 * ramp(fast) + 2 * PERIOD
+        assert np.ptp(self.done.nozzle_G[at >= begun], axis=0).max() <= fast * ramp(fast)
         self.checked()
 
 
-def stop_time(speed: float) -> float:
-    """s: the longest a machine may take from this speed, m/s, to rest, looks and buffers included."""
-    limits = PAPER.limits
-    smooth = 3.0 * max(speed / limits.acceleration_max, np.sqrt(speed / limits.jerk_max))
-    return float(smooth) + 3 * TURN
+def ramp(speed: float) -> float:
+    """s: the shortest from this speed, m/s, to rest: the greatest jerk, then its opposite."""
+    return 2 * float(np.sqrt(speed / PAPER.limits.jerk_max))
 
 
 def bench(body: Callable[[Bench], Awaitable[None]]) -> Callable[[Path], None]:
@@ -130,9 +120,8 @@ def bench(body: Callable[[Bench], Awaitable[None]]) -> Callable[[Path], None]:
 async def test_a_held_key_moves_until_it_is_let_go(hand: Bench) -> None:
     await hand.held("right", 1.0)
     assert hand.speed[-1] == pytest.approx(20 * MM, rel=1e-6)
-    since = len(hand.done) - 1
     hand.go(1.0)
-    hand.stopped_within(since)
+    hand.stops(hand.renewed + LEASE)
     assert np.abs(hand.done.nozzle_G[:, 1:]).max() < 1e-9
 
 
@@ -141,33 +130,29 @@ async def test_a_single_press_moves_for_one_lease_only(hand: Bench) -> None:
     await hand.press("up")
     hand.go(1.5)
     assert hand.printer.status().velocity == 0.0
-    assert 0.0 < hand.done.nozzle_G[-1, 1] < 20 * MM * (LEASE + stop_time(20 * MM))
+    assert 0.0 < hand.done.nozzle_G[-1, 1] < 20 * MM * (LEASE + ramp(20 * MM))
     hand.checked()
 
 
 @bench
 async def test_lost_focus_ends_it_before_the_lease_does(hand: Bench) -> None:
     await hand.held("right", 1.0)
-    since = len(hand.done) - 1
+    let_go = hand.clock.now()
     hand.desk.post_message(AppBlur())
     await hand.pilot.pause()
     hand.go(1.0)
-    hand.stopped_within(since)
-    going = np.flatnonzero(hand.speed > STILL)
-    assert (int(going[-1]) - since) * PERIOD <= stop_time(20 * MM)
+    hand.stops(let_go + TURN)
 
 
 @bench
 async def test_leaving_ends_it_before_the_lease_does(hand: Bench) -> None:
     await hand.held("right", 1.0)
-    since = len(hand.done) - 1
+    let_go = hand.clock.now()
     await hand.press("q")
     await hand.pilot.pause()
     assert not hand.desk.is_running
     hand.go(1.0)
-    hand.stopped_within(since)
-    going = np.flatnonzero(hand.speed > STILL)
-    assert (int(going[-1]) - since) * PERIOD <= stop_time(20 * MM)
+    hand.stops(let_go + TURN)
 
 
 @bench

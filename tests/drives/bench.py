@@ -11,6 +11,7 @@ import select
 import struct
 import tempfile
 import termios
+import time
 import tty
 from pathlib import Path
 
@@ -95,11 +96,12 @@ def _waiting(fd):
     return struct.unpack("i", fcntl.ioctl(fd, termios.FIONREAD, bytes(4)))[0]
 
 
-def _settle(fd, count):
+def _settle(arrived, count):
     """Terminals hand bytes over in their own time: wait for it, so that tests see the same each time."""
     for _ in range(200_000):
-        if _waiting(fd) >= count:
+        if arrived() >= count:
             return
+        time.sleep(0)
     raise AssertionError("the terminal swallowed something")
 
 
@@ -121,7 +123,8 @@ class _Settled:
             self._port.send(frames)
             return
         self._port.send(frames)
-        _settle(self._far, before + sum(6 + 2 * len(data) for _, data in frames))
+        expected = before + sum(6 + 2 * len(data) for _, data in frames)
+        _settle(lambda: _waiting(self._far), expected)
 
 
 class PtyWire:
@@ -133,23 +136,31 @@ class PtyWire:
         self._fd, self._slave = os.openpty()
         tty.setraw(self._slave)
         self.path = os.ttyname(self._slave)
+        self._said = 0
 
     def connect(self):
-        return _Settled(SlcanPort(self.path, 1_000_000), self._fd)
+        port = SlcanPort(self.path, 1_000_000)
+        self._line, self._said = port._bus._line, 0
+        return _Settled(port, self._fd)
+
+    def say(self, text):
+        """Bytes to the master, who has them once this returns."""
+        os.write(self._fd, text)
+        self._said += len(text)
+        _settle(lambda: self._line.heard, self._said)
 
     def work(self, now):
         data = os.read(self._fd, 65536) if select.select([self._fd], [], [], 0)[0] else b""
         text = self.adapter.text(self.far.exchange(now, self.adapter.frames(data)))
         if text:
-            before = _waiting(self._slave)
-            os.write(self._fd, text)
-            _settle(self._slave, before + len(text))
+            self.say(text)
 
     def unplug(self):
         for fd in (self._fd, self._slave):
             os.close(fd)
         self._fd = None
         self.work = lambda now: self.far.exchange(now, [])
+        _settle(lambda: self._line.gone is not None, True)
 
     def close(self):
         if self._fd is not None:

@@ -1,6 +1,5 @@
 """Every fault of the drives' fault list, how it is injected, and what must come of it."""
 
-import os
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -120,8 +119,8 @@ def outbound(bench, cob, becomes):
 
 
 def noise(bench):
-    os.write(bench.wire._fd, b"\xff\x00t18\r\at1818ZZ\rt18")
-    os.write(bench.wire._fd, b"\r")
+    bench.wire.say(b"\xff\x00t18\r\at1818ZZ\rt18")
+    bench.wire.say(b"\r")
 
 
 def encoder_jump(bench):

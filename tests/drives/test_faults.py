@@ -248,6 +248,29 @@ def test_homing_references_one_slider_after_the_other(tmp_path):
     bench.close()
 
 
+def test_homing_can_be_interrupted_and_leaves_the_machine_unreferenced(tmp_path):
+    bench = Bench(reference="homing", homing_method=17, store=ReferenceStore(tmp_path / "r.json")).opened()
+    for drive in bench.far.drives:
+        drive.home_at = 200_000
+    work = bench.clock.work
+
+    def watched(now):
+        work(now)
+        if abs(bench.far.state.slider[0]) > 1e-3:
+            bench.link.interrupt()
+
+    bench.clock.work = watched
+    with pytest.raises(DriveError, match="homing was stopped at drive 1"):
+        bench.link.home()
+    assert bench.far.state.slider[0] == pytest.approx(1e-3, abs=2e-4)
+    assert bench.far.state.slider[1:] == pytest.approx(np.zeros(5), abs=1e-6)
+    assert not bench.link.referenced
+    bench.clock.work = work
+    bench.user.wait_until(bench.clock.now() + 0.5)
+    assert not any(drive.following for drive in bench.far.drives)
+    bench.close()
+
+
 def test_homing_holds_until_the_drives_lose_their_power(tmp_path):
     """A later session finds the marks homing left in the drives; a power cycle takes them away."""
     store = ReferenceStore(tmp_path / "r.json")

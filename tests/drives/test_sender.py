@@ -17,6 +17,7 @@ from trajectories import PAPER, changed, run_of
 from cdhr_host.drives import LinkState, MonotonicClock
 from cdhr_host.drives.rows import joined
 from cdhr_host.drives.sender import SenderLink
+from cdhr_host.drives.sender.far import CAPACITY
 from cdhr_host.drives.sender.ring import FEEDBACK, SETPOINTS, Ring, feedback, packed, setpoints, width
 from cdhr_host.errors import DriveError
 from cdhr_host.job import stream
@@ -136,6 +137,20 @@ def test_revision_is_carried_out_by_the_sender(tmp_path, later):
     wanted = np.rint(np.vstack([rows.slider[:first], hold.slider]) / link.resolution)
     begin = _where(received, wanted[:50])
     assert (received[begin : begin + len(wanted)] == wanted).all()
+
+
+def test_all_that_is_buffered_can_be_replaced_at_once(tmp_path):
+    """The ring's rows and those of the sender's own buffer: more than the ring alone holds."""
+    with running(tmp_path) as (_, link, rows):
+        fed = CAPACITY
+        for _ in range(50):
+            fed += link.feed(rows[fed : fed + link.free])
+            first = link.revisable
+            with suppress(DriveError):
+                link.revise(rows[first:fed])
+                break
+        assert fed - first > CAPACITY
+        _until(lambda: link.feedback() is not None and link.buffered < CAPACITY)
 
 
 def test_rows_of_a_stopped_run_are_not_played_in_the_next(tmp_path):

@@ -102,7 +102,7 @@ def test_dead_adapter_is_noticed_by_reading_alone(line):
     adapter, bus = line
     adapter.vanish()
     with pytest.raises(can.CanOperationError, match="is gone"):
-        bus.receive()
+        bus.receive(1.0)
 
 
 def test_dead_adapter_is_noticed_by_writing_alone(line):

@@ -5,6 +5,7 @@ from concurrent.futures import Executor, Future
 
 import numpy as np
 import pytest
+from stepped import Stepped
 
 from cdhr_host.drives import Loopback
 from cdhr_host.errors import JobError
@@ -24,21 +25,6 @@ class Now(Executor):
         except Exception as error:
             future.set_exception(error)
         return future
-
-
-class Stepped:
-    """Time that passes when a test says so."""
-
-    speed = 1.0
-
-    def __init__(self) -> None:
-        self._now = 0.0
-
-    def now(self) -> float:
-        return self._now
-
-    def wait_until(self, when: float) -> None:
-        self._now = max(self._now, when)
 
 
 class Bench:
@@ -112,6 +98,22 @@ def test_a_long_even_bead_has_no_stop_in_it() -> None:
     speed = np.linalg.norm(np.diff(bench.nozzle(), axis=0), axis=1) / PROFILE.drives.period
     moving = np.flatnonzero(speed > 1e-4)
     assert speed[moving[0] + 600 : moving[-1] - 400].min() > 0.01
+
+
+def test_a_slow_bead_has_no_stop_in_it_and_ends_soon_after_its_client_has() -> None:
+    bench = Bench()
+    turns = np.arange(1, 110) / 40.0
+    bench.send(
+        "G1 X40 F6000",
+        *(f"G1 X{40 * np.cos(a):.3f} Y{40 * np.sin(a):.3f} E{40 * a:.3f} F300" for a in turns),
+    )
+    silent = bench.clock.now()
+    assert silent > 15.0
+    bench.until(lambda: not bench.feed.pending)
+    assert bench.clock.now() - silent < 6.0
+    speed = np.linalg.norm(np.diff(bench.nozzle(), axis=0), axis=1) / PROFILE.drives.period
+    moving = np.flatnonzero(speed > 1e-4)
+    assert speed[moving[0] + 600 : moving[-1] - 400].min() > 0.004
 
 
 def test_the_way_is_that_of_the_whole_file() -> None:
@@ -209,7 +211,7 @@ def test_a_pause_of_the_program_holds() -> None:
     bench = Bench()
     bench.send("G1 X10 F1800", "M0 more clay", "G1 X20")
     bench.until(lambda: bench.state is JobState.HELD)
-    assert bench.nozzle()[-1] == pytest.approx([0.01, 0.0, 0.0], abs=1e-6)
+    assert bench.nozzle()[-1] == pytest.approx([0.0, 0.0, 0.02], abs=1e-6)
     bench.printer.resume()
     bench.feed.finish()
     bench.until(lambda: bench.state is JobState.DONE)

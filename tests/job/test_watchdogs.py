@@ -168,3 +168,19 @@ def test_a_disk_that_runs_full_is_told() -> None:
     alarm = dogs.disk(10**7)
     assert alarm is not None
     assert (alarm.problem.kind, alarm.problem.value, alarm.reaction) == ("disk", 10.0, Reaction.HOLD)
+
+
+def test_an_old_answer_is_no_following_error() -> None:
+    rows = moving(0.02)
+    told = as_planned(rows)
+    silent = slice(MIDDLE, MIDDLE + round(0.09 / PERIOD))
+    old = {
+        name: np.array(getattr(told, name)) for name in ("slider", "setpoint", "torque", "pressure", "force")
+    }
+    for values in old.values():
+        values[silent] = values[MIDDLE - 1]
+    assert Watchdogs(PROFILE).executed(rows, replace(told, **old)) is None
+    turning = old["torque"] + 1e-4 * np.arange(COUNT)[:, None]
+    alarm = Watchdogs(PROFILE).executed(rows, replace(told, **{**old, "torque": turning}))
+    assert alarm is not None
+    assert alarm.problem.kind == "following-error"

@@ -13,6 +13,8 @@ from cdhr_host.motion.sampling import Timeline
 from cdhr_host.values import Dwell, Moves
 
 PERIOD = 0.004
+ROUNDING = 1e-13
+"""m: of positions, where a bend of micrometres is centimetres into its leg"""
 LIMITS = MotionLimits(0.1, 0.5, 5.0, half_width=0.74e-3, stop_angle=math.radians(150))
 COORDINATE = st.integers(-20_000, 20_000).map(lambda micrometre: micrometre * 1e-6)
 STEP = st.one_of(
@@ -48,7 +50,7 @@ def test_limits_hold_and_the_end_is_reached(rows, dwells):
     assert jerk.max(initial=0.0) <= LIMITS.jerk * 1.001
     feed = np.minimum(np.array([speed for _, speed, _ in rows]), LIMITS.speed)
     allowed = np.maximum(feed[np.maximum(line[1:], 1) - 1], feed[np.maximum(line[:-1], 1) - 1])
-    assert (velocity <= allowed * (1 + 1e-9) + 1e-12).all()
+    assert (velocity <= allowed * (1 + 1e-9) + ROUNDING / PERIOD).all()
     assert np.abs(position[0]).max() < 1e-12
     end = commands[-1].end_G[0] if isinstance(commands[-1], Moves) else position[-1]
     assert np.abs(position[-1] - end).max() < 1e-11

@@ -1,11 +1,8 @@
-"""Hostile input at every door: no traceback, no hang, nothing outside the folder, memory flat."""
+"""Hostile input to what stands behind the doors: every line answered, no name outside the folder."""
 
-import asyncio
-import json
-import logging
 import sys
 import tracemalloc
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable
 from pathlib import Path
 
 import pytest
@@ -20,7 +17,6 @@ from cdhr_host.serve.names import program_name
 from cdhr_host.serve.words import Modes, code_of, number_after
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "serve"))
-from doors import Open, with_doors
 from marlin_client import Client, checked, with_client
 
 MANY = settings(
@@ -191,148 +187,3 @@ def test_words_of_any_line_are_read_without_an_error(line: str) -> None:
     number_after(line, "S")
     Numbering().check(line.replace("\n", " ").encode("latin-1", "replace").decode("latin-1"))
     Modes().after(line.encode("latin-1", "replace").decode("latin-1"))
-
-
-JSON = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=10),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
-    max_leaves=8,
-)
-METHODS = """
-server.info printer.objects.subscribe printer.objects.query printer.gcode.script server.files.metadata
-server.files.delete_file server.database.post_item server.database.get_item printer.print.start
-server.files.get_directory server.gcode_store access.oneshot_token no.such objects/query gcode/script
-"""
-NAMES = st.sampled_from(METHODS.split())
-KEYS = st.sampled_from(["objects", "script", "filename", "path", "namespace", "key", "value", "count", "x"])
-PARAMS = st.dictionaries(KEYS, JSON, max_size=3) | JSON
-CALLS = st.fixed_dictionaries({"method": NAMES | st.text(max_size=10), "params": PARAMS, "id": st.integers()})
-
-
-def cases(strategy: st.SearchStrategy[object], count: int) -> list[object]:
-    """Examples drawn once, for doors that are dear to open."""
-    found: list[object] = []
-
-    @settings(max_examples=count, deadline=None, database=None, suppress_health_check=list(HealthCheck))
-    @given(strategy)
-    def collect(each: object) -> None:
-        found.append(each)
-
-    collect()
-    return found
-
-
-def at_doors(tmp_path: Path, act: Callable[[Open], Awaitable[None]], **doors: object) -> None:
-    with_doors(act, tmp_path, **doors)
-    assert {path.name for path in tmp_path.iterdir()} <= {"programs"}
-
-
-def test_a_thousand_hostile_calls_over_the_websocket(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    calls = cases(CALLS | JSON | st.lists(CALLS, max_size=3), 1000)
-
-    async def act(door: Open) -> None:
-        async with door.web.ws_connect(f"{door.url}/websocket") as socket:
-
-            async def ask() -> None:
-                for call in calls:
-                    await socket.send_json(call)
-                await socket.send_str("{" * 3000)
-                await socket.send_json({"id": "last", "method": "server.info"})
-
-            asking = asyncio.create_task(ask())
-            heard = ""
-            while '"id": "last"' not in heard:
-                message = await socket.receive(timeout=20)
-                assert isinstance(message.data, str), message
-                heard = message.data
-            await asking
-
-    with caplog.at_level(logging.ERROR):
-        at_doors(tmp_path, act)
-    assert not caplog.records
-
-
-def test_a_thousand_hostile_calls_over_klippers_socket(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
-    calls = [json.dumps(each).encode() for each in cases(CALLS | JSON, 700)]
-    calls += [bytes(each) for each in cases(st.binary(max_size=60), 300)]
-    path = tmp_path / "klippy.sock"
-
-    async def act(door: Open) -> None:
-        reader, writer = await asyncio.open_unix_connection(path)
-
-        async def ask() -> None:
-            for call in calls:
-                writer.write(call.replace(b"\x03", b"") + b"\x03")
-                await writer.drain()
-            writer.write(b'{"id": "last", "method": "info"}\x03')
-
-        asking = asyncio.create_task(ask())
-        while b'"last"' not in await asyncio.wait_for(reader.readuntil(b"\x03"), 20):
-            continue
-        await asking
-        writer.close()
-
-    with caplog.at_level(logging.ERROR):
-        at_doors(tmp_path, act, klippy=path)
-    assert not caplog.records
-
-
-PLACES = """
-/api/files/local /server/files/upload /printer/gcode/script /api/job /api/printer/command /websocket /
-/server/files/gcodes/x.gcode /server/database/item /printer/objects/query
-"""
-ODD = st.text(alphabet="az09/.%~ü", max_size=20).map(lambda text: f"/{text}")
-PATHS = (st.sampled_from(PLACES.split()) | ODD).map(str.encode)
-FORM = b"Content-Type: multipart/form-data"
-HEADS = [b"Content-Type: application/json", FORM, FORM + b"; boundary=x", b"X-Api-Key: \xff", b"Origin: null"]
-HEADS += [b"Transfer-Encoding: chunked", b"Upgrade: websocket", b"Range: bytes=-1"]
-FILE = b'--x\r\nContent-Disposition: form-data; name="file"; filename="../../x.gcode"\r\n\r\nG28\r\n--x--\r\n'
-BODIES = [b"", b"{", b"[]", b"null", b'{"command": 5}', b'{"commands": [1]}', b"--x\r\n\r\n--x--", FILE]
-BODIES += [b"--x\r\nContent-Disposition: x\r\n\r\nG28"]
-
-
-def request(method: bytes, path: bytes, head: bytes, body: bytes) -> bytes:
-    top = b"%s %s HTTP/1.1\r\nHost: localhost\r\nContent-Length: %d\r\n" % (method, path, len(body))
-    return top + head + b"\r\n\r\n" + body
-
-
-REQUESTS = st.builds(
-    request,
-    st.sampled_from([b"GET", b"POST", b"DELETE", b"PUT", b"OPTIONS"]),
-    PATHS,
-    st.sampled_from(HEADS),
-    st.sampled_from(BODIES) | st.binary(max_size=80),
-)
-
-
-def test_a_thousand_hostile_requests_over_http(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    requests = [bytes(each) for each in cases(REQUESTS, 700)]
-    requests += [bytes(each) for each in cases(st.binary(max_size=200), 300)]
-
-    async def act(door: Open) -> None:
-        door.server.http.gates.headers_within = 0.2
-        host, port = door.url.removeprefix("http://").split(":")
-
-        async def one(request: bytes) -> bytes:
-            reader, writer = await asyncio.open_connection(host, int(port))
-            writer.write(request)
-            writer.write_eof()
-            answer = await asyncio.wait_for(reader.read(1 << 20), 20)
-            writer.close()
-            return answer
-
-        for first in range(0, len(requests), 20):
-            answers = await asyncio.gather(*map(one, requests[first : first + 20]), return_exceptions=True)
-            for request, answer in zip(requests[first : first + 20], answers, strict=True):
-                assert isinstance(answer, bytes | ConnectionError), (request, answer)
-                assert not isinstance(answer, bytes) or b" 500 " not in answer[:20], (request, answer)
-        async with door.web.get(f"{door.url}/server/info") as answer:
-            assert answer.status == 200
-
-    with caplog.at_level(logging.ERROR):
-        at_doors(tmp_path, act)
-    assert not [record for record in caplog.records if record.exc_info]

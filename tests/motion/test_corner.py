@@ -101,7 +101,7 @@ def test_the_path_is_the_same_with_any_feed_override():
     from cdhr_host.motion.leg import FeedOverride, LegPlanner, Segments
 
     ends, _ = corner(90, (0.02, 0.02), (0.04, 0.04))
-    drawn = Segments(ends, np.array([1, 2]), np.array([0.04, 0.04]), np.zeros(2), np.zeros(2))
+    drawn = Segments(ends, np.array([1, 2]), np.array([0.04, 0.04]), np.zeros(2), np.zeros(2), np.ones(2))
     limits = MotionLimits(0.1, A, J, H, math.radians(150))
     paths = []
     for factor in (1.0, 1.7):

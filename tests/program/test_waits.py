@@ -24,6 +24,13 @@ def test_dwell(line: str, expected: str, warned: int) -> None:
     assert len(warnings(commands)) == warned
 
 
+def test_where_a_pause_waits_is_the_profiles() -> None:
+    commands = read("M600 X10 Y-5 Z20\n")
+    assert shown(commands)[-1] == "1 pause 'M600: change the clay'"
+    (warning,) = warnings(commands)
+    assert "X Y Z ignored" in str(warning)
+
+
 @pytest.mark.parametrize("line", ["G4 P-5", "G4 S-0.1"])
 def test_dwell_is_not_negative(line: str) -> None:
     assert "negative" in only_problem(line + "\n").message
@@ -35,6 +42,8 @@ def test_dwell_is_not_negative(line: str) -> None:
         ("M0", "1 pause 'M0'"),
         ("M1 change the clay (slowly) ; comment", "1 pause 'change the clay (slowly)'"),
         ("N3 M0 wait*11", "1 pause 'wait'"),
+        ("M600", "1 pause 'M600: change the clay'"),
+        ("M601", "1 pause 'M601'"),
         ("M117 Layer 3", "1 display 'Layer 3'"),
         ("M117", "1 display ''"),
         ("m117 voil\u00e0", "1 display 'voil\u00e0'"),
@@ -125,7 +134,7 @@ def test_metadata() -> None:
 
 
 def test_every_row_of_the_table_explains_itself() -> None:
-    assert len(WORDS) == 61
+    assert len(WORDS) == 63
     for row in WORDS.values():
         assert row.meaning
         assert row.act.__doc__

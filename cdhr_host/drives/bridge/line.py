@@ -1,12 +1,9 @@
 """A serial line to the bridge."""
 
-import os
-import select
 from typing import Protocol
 
-import serial
-
 from cdhr_host.drives.canopen.port import transport_fault
+from cdhr_host.drives.serial_line import SerialLine
 
 PATIENCE = 0.05
 """s the line may take to make room"""
@@ -36,41 +33,30 @@ class Line(Protocol):
         ...
 
 
-class SerialLine:
+class BridgeLine:
     """A tty."""
 
     def __init__(self, path: str, baud: int) -> None:
         try:
-            self._port = serial.Serial(path, baudrate=baud, timeout=0, exclusive=True)
-        except (OSError, ValueError) as error:
-            raise transport_fault(f"cannot open {path}: {error}") from error
-        self._fd = self._port.fileno()
+            self._line = SerialLine(path, baud, PATIENCE)
+        except OSError as error:
+            raise transport_fault(str(error)) from error
         self.rate = baud / BITS
 
     def write(self, data: bytes) -> None:
         """Send all, waiting for room a little."""
-        view = memoryview(data)
-        while view:
-            try:
-                view = view[os.write(self._fd, view) :]
-            except BlockingIOError:
-                if not select.select([], [self._fd], [], PATIENCE)[1]:
-                    raise transport_fault("the bridge takes no more bytes") from None
-            except OSError as error:
-                raise transport_fault(f"{self._port.port} is gone: {error.strerror}") from error
+        try:
+            self._line.write(data)
+        except OSError as error:
+            raise transport_fault(str(error)) from error
 
     def read(self) -> bytes:
         """All that has arrived."""
-        if not select.select([self._fd], [], [], 0)[0]:
-            return b""
         try:
-            data = os.read(self._fd, 65536)
+            return self._line.read()
         except OSError as error:
-            raise transport_fault(f"{self._port.port} is gone: {error.strerror}") from error
-        if not data:
-            raise transport_fault(f"{self._port.port} is gone")
-        return data
+            raise transport_fault(str(error)) from error
 
     def close(self) -> None:
         """Close the tty."""
-        self._port.close()
+        self._line.close()

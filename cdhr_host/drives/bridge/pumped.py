@@ -10,7 +10,7 @@ import time
 from typing import Final
 
 from cdhr_host.drives.bridge.host import BridgeLink
-from cdhr_host.drives.bridge.line import SerialLine
+from cdhr_host.drives.bridge.line import BridgeLine
 from cdhr_host.drives.bridge.talker import TURN
 from cdhr_host.drives.clock import MonotonicClock
 from cdhr_host.drives.link import LinkState
@@ -27,7 +27,7 @@ class PumpedBridge:
     def __init__(self, profile: Profile, path: str, baud: int) -> None:
         self.profile = profile
         self.resolution = profile.canopen.position_unit
-        self._link = BridgeLink(profile, MonotonicClock(), lambda: SerialLine(path, baud))
+        self._link = BridgeLink(profile, MonotonicClock(), lambda: BridgeLine(path, baud))
         self._lock = threading.Lock()
         self._ended = threading.Event()
         self._thread: threading.Thread | None = None
@@ -85,6 +85,10 @@ class PumpedBridge:
         """Nothing to find."""
         with self._lock:
             self._link.home()
+
+    def interrupt(self) -> None:
+        """Nothing to end."""
+        self._link.interrupt()
 
     def arm(self, start: Array) -> None:
         """OPEN or STOPPED -> ARMED."""

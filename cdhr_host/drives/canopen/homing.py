@@ -26,12 +26,15 @@ PATIENCE: Final = 120.0
 """s homing of an axis may take"""
 
 
-def home(machine: CanopenMachine) -> None:
-    """Home all axes in turn with little torque; raises DriveError, with the axis at rest."""
+def home(machine: CanopenMachine, should_stop: Callable[[], bool]) -> None:
+    """Home all axes in turn with little torque; raises DriveError, with the axis at rest.
+
+    ``should_stop`` is asked in every cycle.
+    """
     for axis in machine.axes:
         _prepare(machine, axis)
         try:
-            _home(machine, axis)
+            _home(machine, axis, should_stop)
         finally:
             axis.word = SWITCH_ON
             _leave(machine, axis)
@@ -60,7 +63,7 @@ def _prepare(machine: CanopenMachine, axis: Axis) -> None:
     set_mode(machine.bus, axis.node, HOMING)
 
 
-def _home(machine: CanopenMachine, axis: Axis) -> None:
+def _home(machine: CanopenMachine, axis: Axis, should_stop: Callable[[], bool]) -> None:
     for word, state in STEPS_UP:
         axis.word = word
         machine.run_until(_is(axis, state), f"become {state.value}", _this(axis))
@@ -72,6 +75,8 @@ def _home(machine: CanopenMachine, axis: Axis) -> None:
         if findings:
             raise findings[0]
         machine.hold()
+        if should_stop():
+            raise fault("homing", f"homing was stopped at drive {axis.node}: nothing may move")
         if axis.status & FOLLOWING_ERROR or machine.bus.clock.now() > deadline:
             raise fault("homing", f"drive {axis.node} did not find its home")
 

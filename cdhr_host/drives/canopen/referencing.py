@@ -1,5 +1,7 @@
 """Whether the axes know the reference pose: by themselves, by a stored offset, or by homing."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from cdhr_host.drives.canopen.homing import home, mark, marks
@@ -31,19 +33,20 @@ class Referencing:
     def check(self, machine: CanopenMachine) -> None:
         """DriveError with the next step unless every axis knows the reference pose."""
         if lost := sorted(axis + 1 for axis in machine.watch.unreferenced):
-            raise unreferenced(lost)
+            raise unreferenced(lost, self._mode)
         if self._mode == "stored":
             self._store.zero(self._profile, machine.found.serials)
         elif self._mode == "homing" and not self._homed:
-            raise unreferenced([1, 2, 3, 4, 5, 6])
+            raise unreferenced([1, 2, 3, 4, 5, 6], self._mode)
 
-    def home(self, machine: CanopenMachine) -> None:
+    def home(self, machine: CanopenMachine, should_stop: Callable[[], bool]) -> None:
         """Mode 6, one slider at a time; nothing to do where the profile says otherwise.
 
         It holds as long as the drives have power: they keep a mark, and so does the store.
         """
         if self._mode == "homing":
-            home(machine)
+            self._homed = False
+            home(machine, should_stop)
             self._store.mark(self._profile, machine.found.serials, mark(machine))
             self._homed = True
             machine.watch.unreferenced.clear()

@@ -8,6 +8,7 @@ gives way every SWITCH.
 import ctypes
 import gc
 import os
+import select
 import signal
 import sys
 from dataclasses import dataclass
@@ -37,7 +38,11 @@ SWITCH: Final = 1e-4
 """s after which the thread that works out a stop gives way to the cycle"""
 CAPACITY: Final = 1024
 """setpoints in the ring, besides those in the sender's own buffer"""
+REVISION: Final = 4 * CAPACITY
+"""setpoints of a revision at most: all in the ring and in the sender's own buffer, at any rate of ticks"""
 RESULTS: Final = 16384
+BATCH: Final = 16
+"""rows moved from the ring at a time while cycles run: one check for all of them"""
 IDLE: Final = 0.05
 """s between two looks for commands while there is no cycle"""
 JITTER: Final = 0.5
@@ -54,6 +59,7 @@ class Word(IntEnum):
     FAULTS = 3
     EXECUTED = 4
     REVISABLE = 5
+    INTERRUPT = 6
 
 
 NOWHERE: Final = -(2**62)
@@ -74,9 +80,10 @@ class Spec:
 
 
 def run(spec: Spec, commands: Connection) -> None:
-    """The process's main function; ends when the link was closed or the host is gone."""
+    """The process's main function; ends when the link was closed, the host is gone, or by SIGTERM."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sender = Sender(spec, commands)
+    signal.signal(signal.SIGTERM, lambda _number, _frame: sender.leave())
     real_time = hurry()
     try:
         sender.loop(real_time)
@@ -106,9 +113,11 @@ class Sender:
     def __init__(self, spec: Spec, commands: Connection) -> None:
         self._profile = spec.profile
         self._commands = commands
+        self._asked = select.poll()
+        self._asked.register(commands.fileno(), select.POLLIN)
         self._rows = Ring(width(SETPOINTS, Setpoints), CAPACITY, spec.rows)
         self._results = Ring(width(FEEDBACK, Feedback), RESULTS, spec.results)
-        self._revisions = Ring(width(SETPOINTS, Setpoints), CAPACITY, spec.revisions)
+        self._revisions = Ring(width(SETPOINTS, Setpoints), REVISION, spec.revisions)
         self._memory = SharedMemory(spec.status)
         self._status = np.ndarray((len(Word),), np.int64, self._memory.buf)
         clock = MonotonicClock()
@@ -128,6 +137,10 @@ class Sender:
                 self._move()
             self._publish()
 
+    def leave(self) -> None:
+        """End after this cycle: what moves is stopped on its path first."""
+        self._alive = False
+
     def end(self) -> None:
         """Whatever happened: at rest, voltage off, memory given back."""
         try:
@@ -144,7 +157,7 @@ class Sender:
     def _obey(self, patience: float) -> None:
         """Do what the host asks; a host that is gone asks for the end."""
         try:
-            if not self._commands.poll(patience):
+            if not self._asked.poll(patience * 1e3):
                 return
             name, *arguments = self._commands.recv()
         except (EOFError, OSError):
@@ -168,6 +181,9 @@ class Sender:
     def _abandoned(self) -> None:
         self._take_rows()
         self._alive = False
+
+    def _do_ready(self) -> None:
+        """All the shared memory is open."""
 
     def _do_open(self) -> list[str]:
         self._link.open()
@@ -198,7 +214,7 @@ class Sender:
         Nothing else reads or writes the rows meanwhile and no cycle runs: the next one sees
         either all of the revision or, when it is refused, nothing of it.
         """
-        revised = setpoints(self._revisions.take(CAPACITY))
+        revised = setpoints(self._revisions.take(REVISION))
         self._take_rows()
         first = int(revised.tick[0])
         kept = max(first - self._link.next_tick, 0)
@@ -227,7 +243,7 @@ class Sender:
         return self._link.referenced
 
     def _do_home(self) -> None:
-        self._link.home()
+        self._link.home(lambda: bool(self._status[Word.INTERRUPT]))
 
     def _do_reference(self) -> None:
         self._link.set_reference()
@@ -238,7 +254,8 @@ class Sender:
     def _move(self) -> None:
         """Rows in, results out; a fault goes to the host once."""
         try:
-            self._take_rows()
+            if self._link.free >= BATCH:
+                self._take_rows()
             executed = self._link.feedback()
         except DriveError as error:
             self._say("fault", error.problems)

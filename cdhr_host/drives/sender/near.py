@@ -15,7 +15,7 @@ from cdhr_host.drives.checks import STANDS_WITHIN, check_rows, check_shapes
 from cdhr_host.drives.faults import fault
 from cdhr_host.drives.link import LinkState
 from cdhr_host.drives.rows import no_feedback
-from cdhr_host.drives.sender.far import CAPACITY, NOWHERE, RESULTS, STATES, Spec, Word, run
+from cdhr_host.drives.sender.far import CAPACITY, NOWHERE, RESULTS, REVISION, STATES, Spec, Word, run
 from cdhr_host.drives.sender.ring import FEEDBACK, SETPOINTS, Ring, feedback, packed, width
 from cdhr_host.drives.timing import CycleTiming
 from cdhr_host.errors import DriveError, Problem
@@ -84,6 +84,8 @@ class SenderLink:
             raise DriveError(Problem("state", f"the drives are {self.state.value}, not closed"))
         self._start()
         try:
+            self._ask("ready")
+            self._unlink()
             self.notes = self._ask("open")
         except BaseException:
             self._end()
@@ -130,9 +132,9 @@ class SenderLink:
         if not len(rows):
             return
         check_shapes(rows)
-        if len(rows) > CAPACITY:
-            message = f"a revision of {len(rows)} rows does not fit: there is room for {CAPACITY}"
-            raise DriveError(Problem("overflow", message, value=len(rows), limit=CAPACITY))
+        if len(rows) > REVISION:
+            message = f"a revision of {len(rows)} rows does not fit: there is room for {REVISION}"
+            raise DriveError(Problem("overflow", message, value=len(rows), limit=REVISION))
         self._revisions.write(packed(rows, SETPOINTS))
         self._ask("revise")
         after = int(rows.tick[-1]) + 1
@@ -152,6 +154,7 @@ class SenderLink:
         """Come to rest on the path, air off."""
         if self._process is None:
             raise DriveError(Problem("state", "the drives are closed, not open"))
+        self._status[Word.INTERRUPT] = 0
         if self.state is not LinkState.FAULT:
             self._ask("stop")
 
@@ -162,7 +165,15 @@ class SenderLink:
 
     def home(self) -> None:
         """Reference every axis by homing, one after the other."""
-        self._ask("home")
+        try:
+            self._ask("home")
+        finally:
+            self._status[Word.INTERRUPT] = 0
+
+    def interrupt(self) -> None:
+        """End homing within a cycle; from any thread."""
+        if self._process is not None:
+            self._status[Word.INTERRUPT] = 1
 
     def set_reference(self) -> None:
         """The machine stands at its reference pose: remember it."""
@@ -182,8 +193,9 @@ class SenderLink:
     def _start(self) -> None:
         self._rows = Ring(width(SETPOINTS, Setpoints), CAPACITY)
         self._results = Ring(width(FEEDBACK, Feedback), RESULTS)
-        self._revisions = Ring(width(SETPOINTS, Setpoints), CAPACITY)
+        self._revisions = Ring(width(SETPOINTS, Setpoints), REVISION)
         self._memory = SharedMemory(create=True, size=8 * len(Word))
+        self._named = True
         self._status = np.ndarray((len(Word),), np.int64, self._memory.buf)
         self._status[:] = 0
         self._status[Word.STOP_TICK] = NOWHERE
@@ -192,7 +204,7 @@ class SenderLink:
         self._pipe, far = context.Pipe()
         rings = (self._rows.name, self._results.name, self._revisions.name)
         spec = Spec(self._url, self.profile, self._store, *rings, self._memory.name)
-        self._process = context.Process(target=run, args=(spec, far), name="cdhr-sender")
+        self._process = context.Process(target=run, args=(spec, far), name="cdhr-sender", daemon=True)
         self._process.start()
         far.close()
         self._fault = None
@@ -208,12 +220,19 @@ class SenderLink:
             self._process.join()
         self._process = None
         del self._status
+        self._unlink()
         self._memory.close()
-        self._memory.unlink()
-        self._rows.close()
-        self._results.close()
-        self._revisions.close()
+        for ring in (self._rows, self._results, self._revisions):
+            ring.close()
         self.state = LinkState.CLOSED
+
+    def _unlink(self) -> None:
+        """Both sides have the memory open: without a name it ends with them, killed or not."""
+        if self._named:
+            self._named = False
+            self._memory.unlink()
+        for ring in (self._rows, self._results, self._revisions):
+            ring.unlink()
 
     def _ask(self, name: str, *arguments: Any) -> Any:
         """A command and its answer; raises DriveError when it is refused or the sender is dead."""

@@ -91,12 +91,17 @@ class Ring:
                 return records
         raise fault("ring", f"a record between host and sender is damaged (number {at} or later)")
 
+    def unlink(self) -> None:
+        """Take the name away: the memory is freed once nobody has it open, however they ended."""
+        if self._owner:
+            self._memory.unlink()
+            self._owner = False
+
     def close(self) -> None:
         """Give the memory back; the owner's ``close`` removes it."""
         del self._counters, self._records
         self._memory.close()
-        if self._owner:
-            self._memory.unlink()
+        self.unlink()
 
 
 def _checks(records: Array, first: int) -> Array:

@@ -121,8 +121,9 @@ def program(poses: Poses, told: str) -> Iterator[str]:
     yield "G28"
 
 
-def sheet(poses: Poses) -> Iterator[str]:
-    """The table to fill in: sliders as planned, the measured columns empty."""
+def sheet(poses: Poses, measured: Array | None = None) -> Iterator[str]:
+    """The table: sliders as planned, the columns to fill in empty, or (N, 3) m that were measured."""
     yield ",".join([*(f"slider{i}_mm" for i in range(1, 7)), "x_mm", "y_mm", "z_mm"])
-    for row in poses.slider / MM:
-        yield ",".join([*(f"{value:.6f}" for value in row), "", "", ""])
+    for number, row in enumerate(poses.slider / MM):
+        place = ["", "", ""] if measured is None else [f"{value:.4f}" for value in measured[number] / MM]
+        yield ",".join([*(f"{value:.6f}" for value in row), *place])

@@ -49,13 +49,18 @@ class Tried(NamedTuple):
     """m, greatest standard deviation the calibration gives itself there"""
 
 
-def tried(trial: Trial) -> Tried:
-    """Draw the machine, measure it, calibrate, compare with the truth."""
+def measured(trial: Trial) -> tuple[Array, Array]:
+    """(P,) m, (N, 3) m: the machine drawn, and what is measured of its nozzle."""
     draws = np.random.Generator(np.random.Philox(key=trial.seed))
     truth = trial.doubts.each() * draws.standard_normal(SIZE)
-    same = Frame.same()
     noise = trial.noise * draws.standard_normal((len(trial.slider), 3))
-    place = predicted(trial.cables, same, truth, trial.slider) + noise
+    return truth, predicted(trial.cables, Frame.same(), truth, trial.slider) + noise
+
+
+def tried(trial: Trial) -> Tried:
+    """Draw the machine, measure it, calibrate, compare with the truth."""
+    truth, place = measured(trial)
+    same = Frame.same()
     found = calibrate(trial.cables, Points(trial.slider, place), trial.doubts, noise=trial.noise)
     free = trial.doubts.each() > 0.0
     off = (found.parameters - truth)[free] / found.deviation[free]

@@ -98,8 +98,7 @@ class Commands:
     def _program_word(self, code: str, line: str, *, numbered: bool) -> Answer:
         """A word of programs: refused at once when it is typed alone, else the stream's to judge."""
         alone = not numbered and not self._bench.pending
-        _, problems = parse_line(line, 1)
-        if problems and alone:
+        if alone and (problems := parse_line(line, 1)[1]):
             return [*(f"echo:{problem_text(problem)}" for problem in problems[:3]), *OK]
         if code in PAUSES:
             return self._pause(line)

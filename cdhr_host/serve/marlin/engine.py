@@ -48,7 +48,7 @@ class Engine:
     def receive(self, data: bytes, now: float) -> None:
         """Bytes from the client at ``now``, s."""
         for line in self._framer.lines(data):
-            if line is not None:
+            if line is not None and ("M" in line or "m" in line):
                 self._emergency(line)
             self._queue.append(line)
         self.tick(now)

@@ -2,6 +2,8 @@
 
 import re
 from dataclasses import dataclass
+from functools import reduce
+from operator import xor
 from typing import Final
 
 LINE_MAX: Final = 1024
@@ -110,7 +112,4 @@ class Numbering:
 
 
 def _checksum(text: str) -> int:
-    value = 0
-    for byte in text.encode("latin-1"):
-        value ^= byte
-    return value
+    return reduce(xor, text.encode("latin-1"), 0)

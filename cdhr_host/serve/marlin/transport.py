@@ -33,23 +33,27 @@ class Ticking:
         self._engine = engine
         self._after = after
         self._loop = asyncio.get_running_loop()
-        self._timer: asyncio.TimerHandle | None = None
-        self.again()
+        self._eager = engine.waiting
+        self._timer = self._later()
 
     def again(self) -> None:
-        """Look again soon."""
-        self.stop()
-        self._timer = self._loop.call_later(EAGER if self._engine.waiting else PATIENT, self._tick)
+        """The engine has heard something: look at it sooner where it owes an answer now."""
+        if self._engine.waiting and not self._eager:
+            self._timer.cancel()
+            self._timer = self._later()
 
     def stop(self) -> None:
         """No more."""
-        if self._timer is not None:
-            self._timer.cancel()
+        self._timer.cancel()
+
+    def _later(self) -> asyncio.TimerHandle:
+        self._eager = self._engine.waiting
+        return self._loop.call_later(EAGER if self._eager else PATIENT, self._tick)
 
     def _tick(self) -> None:
         self._engine.tick(self._loop.time())
+        self._timer = self._later()
         self._after()
-        self.again()
 
 
 class PtyDoor:
@@ -70,6 +74,8 @@ class PtyDoor:
         self._ticking: Ticking | None = None
         self._looking: asyncio.TimerHandle | None = None
         self._loop = asyncio.get_running_loop()
+        self._reads = self._writes = False
+        """what the event loop looks out for; asking it for what it does already is dear"""
 
     def open(self) -> None:
         """Make the name, wait for clients."""
@@ -102,11 +108,24 @@ class PtyDoor:
     def _come(self) -> None:
         self._engine = Engine(self._make_bench("the serial line"))
         self._ticking = Ticking(self._engine, self._flush)
-        self._loop.add_reader(self._fd, self._readable)
+        self._look_out(reads=True, writes=False)
+
+    def _look_out(self, *, reads: bool, writes: bool) -> None:
+        if reads is not self._reads:
+            self._reads = reads
+            if reads:
+                self._loop.add_reader(self._fd, self._readable)
+            else:
+                self._loop.remove_reader(self._fd)
+        if writes is not self._writes:
+            self._writes = writes
+            if writes:
+                self._loop.add_writer(self._fd, self._flush)
+            else:
+                self._loop.remove_writer(self._fd)
 
     def _gone(self) -> None:
-        self._loop.remove_reader(self._fd)
-        self._loop.remove_writer(self._fd)
+        self._look_out(reads=False, writes=False)
         if self._ticking is not None:
             self._ticking.stop()
         if self._engine is not None:
@@ -142,13 +161,7 @@ class PtyDoor:
                 out = out[os.write(self._fd, out) :]
         if out:
             self._engine.put_back(out)
-            self._loop.add_writer(self._fd, self._flush)
-        else:
-            self._loop.remove_writer(self._fd)
-        if self._engine.full:
-            self._loop.remove_reader(self._fd)
-        else:
-            self._loop.add_reader(self._fd, self._readable)
+        self._look_out(reads=not self._engine.full, writes=bool(out))
 
 
 class TcpClient(asyncio.Protocol):

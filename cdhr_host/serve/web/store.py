@@ -38,4 +38,8 @@ class Store:
     def delete(self, space: str, key: str) -> Any:
         """Forget a value; None when there was none."""
         self._sizes.pop((space, key), None)
-        return self._spaces.get(space, {}).pop(key, None)
+        values = self._spaces.get(space, {})
+        value = values.pop(key, None)
+        if not values:
+            self._spaces.pop(space, None)
+        return value

@@ -186,6 +186,11 @@ async function listFiles() {
   }));
 }
 
+function stop() {
+  call("printer.emergency_stop").catch(() => fetched("/printer/emergency_stop", { method: "POST" }))
+    .catch((error) => tell(`the emergency stop did NOT get through: ${error.message}`));
+}
+
 function upload(form, print) {
   const told = by("upload-told"), bar = by("upload-progress"), body = new FormData();
   body.append("root", "gcodes");
@@ -207,7 +212,7 @@ function upload(form, print) {
   request.send(body);
 }
 
-by("stop").onclick = () => order("printer.emergency_stop");
+by("stop").onclick = stop;
 by("hold").onclick = () => order("printer.print.pause");
 by("resume").onclick = () => order("printer.print.resume");
 by("cancel").onclick = () => {
@@ -225,6 +230,6 @@ for (const [id, word] of [["feed", "M220"], ["flow", "M221"]]) {
 }
 by("upload").onsubmit = (event) => { event.preventDefault(); upload(event.target, event.submitter ? event.submitter.value : "false"); };
 by("line").onsubmit = (event) => { event.preventDefault(); const text = by("code").value.trim(); if (text) script(text); by("code").value = ""; };
-document.addEventListener("keydown", (event) => { if (event.key === "Escape" && !by("ask").open) order("printer.emergency_stop"); });
+document.addEventListener("keydown", (event) => { if (event.key === "Escape" && !by("ask").open) stop(); });
 setInterval(() => { if (socket && socket.readyState === WebSocket.OPEN && Date.now() - heard > 5000) socket.close(); }, 1000);
 connect();
