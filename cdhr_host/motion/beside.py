@@ -17,19 +17,19 @@ GENTLE = 0.1
 """Root of the least turn that counts."""
 
 
-def rooms(drawn: Array, corner: Ints, turn: Array, changes: Flags, h: float, most: Array) -> Array:
+def rooms(drawn: Array, corner: Ints, turn: Array, changes: Flags, *, least: float, most: Array) -> Array:
     """(2, K) m before and after each corner at points ``corner`` (K,) of a polyline.
 
     ``drawn`` (M+1,) m is how far along each point is, ``turn`` (K,) the change of direction,
     ``changes`` (M+1,) where the feed does; none needs more than ``most`` (K,) m. Where a straight
-    is long enough, both corners have at least ``h``.
+    is long enough, both corners have at least ``least`` m.
     """
     at = drawn[corner]
     place = np.concatenate((drawn[:1], at, drawn[-1:]))
     weight = np.concatenate(([STOP], np.maximum(np.sqrt(turn), GENTLE), [STOP]))
     between = np.diff(place)
-    least = np.minimum(h, between / 2)
-    after = np.clip(between * weight[:-1] / (weight[:-1] + weight[1:]), least, between - least)
+    kept = np.minimum(least, between / 2)
+    after = np.clip(between * weight[:-1] / (weight[:-1] + weight[1:]), kept, between - kept)
     borders = np.concatenate(([-np.inf], drawn[changes], [np.inf]))
     right, left = np.searchsorted(borders, at, "right"), np.searchsorted(borders, at, "left") - 1
     found = np.stack(

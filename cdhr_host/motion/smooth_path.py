@@ -123,7 +123,8 @@ def smooth(
     ends = np.minimum(passed + drawn[corner], drawn[-1] - drawn[corner] if closes else math.inf)
     own = h - 3.0 * (np.zeros(len(points)) if spent is None else spent)[corner]
     turned = norms(turns[1] - turns[0])
-    room = rooms(drawn, corner, turned, _changes(allowed, len(points)), h, _needed(allowed, corner))
+    changes, most = _changes(allowed, len(points)), _needed(allowed, corner)
+    room = rooms(drawn, corner, turned, changes, least=h, most=most)
     rounding = roundings(room, corner, turns, Widths(h, own, ends), allowed)
     saved = np.zeros((2, len(points)))
     saved[:, corner] = rounding.saved
