@@ -24,9 +24,9 @@ SPENT = 1 / 5
 """half-widths, how far a point may move: three fifths of the tolerance"""
 TRIES = (1.0, 0.8, 0.65, 0.5, 0.4)
 """Of REACH, lengths that are tried."""
-CALM = 1.0
-"""Turns that may lie within two half-widths beyond a straight's end: kernels overlap there, and
-are a sixth of the turns between them times the half-width off."""
+CALM = 0.75
+"""Turns that may lie within two half-widths beyond a straight's end: where kernels overlap, the path is
+up to a sixth of the turns between them times h off, and with SPENT that must be less than a third of h."""
 ONWARDS = 0.5
 """Least cosine between a moved segment and its straight."""
 LEAST = 2.5
@@ -84,7 +84,7 @@ def straightened(points: Array, feed: Array, h: float) -> tuple[Array, Array]:
 
 def reach(h: float) -> float:
     """m of path, to each side, on which the place of a point depends."""
-    return (3 * REACH + 4) * h
+    return (3 * REACH + 8) * h
 
 
 def _paired(drawn: _Drawn, feed: Array, h: float, spent: Array) -> Array:

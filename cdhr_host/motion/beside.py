@@ -1,8 +1,7 @@
 """How far the rounding of each corner may reach along the straights beside it.
 
 Neighbours share the straight between them: the sharper a corner, the more of it. A
-straight goes on over points that are no corners, but ends where the feed changes, for no
-change of speed goes on there.
+straight goes on over points that are no corners. What is braked ends where the feed changes.
 """
 
 import numpy as np
@@ -17,28 +16,26 @@ GENTLE = 0.1
 """Root of the least turn that counts."""
 
 
-def rooms(drawn: Array, corner: Ints, turn: Array, changes: Flags, *, least: float, most: Array) -> Array:
+def rooms(drawn: Array, corner: Ints, turn: Array, *, least: float, most: Array) -> Array:
     """(2, K) m before and after each corner at points ``corner`` (K,) of a polyline.
 
-    ``drawn`` (M+1,) m is how far along each point is, ``turn`` (K,) the change of direction,
-    ``changes`` (M+1,) where the feed does; none needs more than ``most`` (K,) m. Where a straight
-    is long enough, both corners have at least ``least`` m.
+    ``drawn`` (M+1,) m is how far along each point is, ``turn`` (K,) the change of direction; none
+    needs more than ``most`` (K,) m. Where a straight is long enough, both corners have at least ``least`` m.
     """
-    at = drawn[corner]
-    place = np.concatenate((drawn[:1], at, drawn[-1:]))
+    between = np.diff(drawn[corner], prepend=drawn[0], append=drawn[-1])
     weight = np.concatenate(([STOP], np.maximum(np.sqrt(turn), GENTLE), [STOP]))
-    between = np.diff(place)
     kept = np.minimum(least, between / 2)
     after = np.clip(between * weight[:-1] / (weight[:-1] + weight[1:]), kept, between - kept)
+    found = np.stack(((between - after)[:-1], after[1:]))
+    return np.asarray(APART * np.minimum(found, np.maximum(most, 2 * least)), dtype=np.float64)
+
+
+def same_feed(drawn: Array, corner: Ints, changes: Flags) -> Array:
+    """(2, K) m before and after each corner in which the feed stays; ``changes`` (M+1,) tells where not."""
+    at = drawn[corner]
     borders = np.concatenate(([-np.inf], drawn[changes], [np.inf]))
     right, left = np.searchsorted(borders, at, "right"), np.searchsorted(borders, at, "left") - 1
-    found = np.stack(
-        (
-            np.minimum((between - after)[:-1], at - borders[left]),
-            np.minimum(after[1:], borders[right] - at),
-        )
-    )
-    return np.asarray(APART * np.minimum(found, most), dtype=np.float64)
+    return np.asarray(np.stack((at - borders[left], borders[right] - at)), dtype=np.float64)
 
 
 def way(speed: Array, acceleration: float, jerk: float) -> Array:

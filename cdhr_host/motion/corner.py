@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdhr_host.motion.beside import APART
-from cdhr_host.values import Array, Flags, Ints
+from cdhr_host.values import Array, Ints
 
 SHARES = np.linspace(-1.0, 1.0, 9)
 """p/r that are compared on each side; the first is the kernel's."""
@@ -100,24 +100,28 @@ class Widths:
 
 
 def roundings(
-    room: Array, corner: Ints, turns: tuple[Array, Array], widths: Widths, allowed: Allowance | None
+    rooms: tuple[Array, Array],
+    corner: Ints,
+    turns: tuple[Array, Array],
+    widths: Widths,
+    allowed: Allowance | None,
 ) -> Rounding:
-    """Roundings of the corners at some points of a polyline with ``room`` (2, K) m before and after them.
+    """Roundings of the corners at some points of a polyline.
 
-    ``turns`` are the directions (K, 3) before and after each corner.
+    ``rooms`` are (2, K) m each before and after them: of the straights, and of those as far as the
+    feed stays. ``turns`` are the directions (K, 3) before and after each corner.
     """
     h, turn = widths.usual, np.sqrt(((turns[1] - turns[0]) ** 2).sum(axis=1))
-    reach = room.min(axis=0)
-    alone = reach >= APART * h
-    half = np.where(alone, np.minimum(reach, 2 * widths.own / turn), h)
+    reach = rooms[0].min(axis=0)
+    half = np.where(reach >= APART * h, np.minimum(reach, 2 * widths.own / turn), h)
     half = np.minimum(half, widths.ends / 2)
     none, steep = np.zeros((2, len(half))), 1 / half**2
     found = Rounding(half, none, none.copy(), np.array([[-steep, steep], [steep, -steep]]))
     if allowed is not None:
         share = _beside(allowed.share, corner, 0.0).min(axis=0)
         limits = np.multiply.outer(np.array([allowed.acceleration, allowed.jerk]), share)
-        around = Corners(turn, room, _beside(allowed.feed, corner, 0.0), limits, widths.own)
-        _brake(found, _worthwhile(half, around, alone, allowed), around)
+        around = Corners(turn, rooms[1], _beside(allowed.feed, corner, 0.0), limits, widths.own)
+        _brake(found, _worthwhile(half, around, h, allowed), around)
     return found
 
 
@@ -127,7 +131,7 @@ def _beside(values: Array, corner: Ints, end: float) -> Array:
     return np.stack((padded[corner], padded[corner + 1]))
 
 
-def _worthwhile(half: Array, around: Corners, alone: Flags, allowed: Allowance) -> Ints:
+def _worthwhile(half: Array, around: Corners, h: float, allowed: Allowance) -> Ints:
     """Corners with room on both sides at which a kernel would hold up a change of speed.
 
     Not where the air bounds that change: a flow that falls and rises within a corner is the hardest for it.
@@ -135,7 +139,8 @@ def _worthwhile(half: Array, around: Corners, alone: Flags, allowed: Allowance) 
     by_jerk = np.cbrt(allowed.jerk * half**2 / around.turn)
     by_acceleration = np.sqrt(allowed.acceleration * half / around.turn)
     slow = np.minimum(by_jerk, by_acceleration) < around.feed.max(axis=0)
-    return np.flatnonzero(slow & alone & (around.limits[0] >= allowed.acceleration))
+    roomy = around.room.min(axis=0) >= APART * h
+    return np.flatnonzero(slow & roomy & (around.limits[0] >= allowed.acceleration))
 
 
 @dataclass(frozen=True, slots=True)

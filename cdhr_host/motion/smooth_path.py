@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdhr_host.motion.beside import norms, rooms, way
+from cdhr_host.motion.beside import norms, rooms, same_feed, way
 from cdhr_host.motion.corner import Allowance, Rounding, Widths, roundings
 from cdhr_host.values import Array, Flags, Ints
 
@@ -123,9 +123,9 @@ def smooth(
     ends = np.minimum(passed + drawn[corner], drawn[-1] - drawn[corner] if closes else math.inf)
     own = h - 3.0 * (np.zeros(len(points)) if spent is None else spent)[corner]
     turned = norms(turns[1] - turns[0])
-    changes, most = _changes(allowed, len(points)), _needed(allowed, corner)
-    room = rooms(drawn, corner, turned, changes, least=h, most=most)
-    rounding = roundings(room, corner, turns, Widths(h, own, ends), allowed)
+    room = rooms(drawn, corner, turned, least=h, most=_needed(allowed, corner))
+    even = same_feed(drawn, corner, _changes(allowed, len(points)))
+    rounding = roundings((room, np.minimum(room, even)), corner, turns, Widths(h, own, ends), allowed)
     saved = np.zeros((2, len(points)))
     saved[:, corner] = rounding.saved
     after = drawn + np.cumsum(saved.sum(axis=0))

@@ -1,0 +1,86 @@
+"""Straight ways to sharp corners: nothing moves further than promised, and time is saved."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from motion_tracks import distance_to, moves, norm
+
+from cdhr_host.motion import approach
+from cdhr_host.motion.approach import SPENT, straightened
+from cdhr_host.motion.corner import Allowance
+from cdhr_host.motion.limits import MotionLimits
+from cdhr_host.motion.planner import Planner
+from cdhr_host.motion.smooth_path import smooth
+
+H, A, J = 0.747e-3, 0.5, 5.0
+LIMITS = MotionLimits(0.1, A, J, H, math.radians(179))
+
+
+def curves(turns, radii, chords):
+    """Arcs of chords that meet in corners."""
+    points, heading = [np.zeros(2)], 0.0
+    for turn, radius, chord in zip(turns, radii, chords, strict=True):
+        heading += turn
+        for _ in range(8):
+            heading += chord / radius
+            points.append(points[-1] + chord * np.array([math.cos(heading), math.sin(heading)]))
+    return np.column_stack((points, np.zeros(len(points))))
+
+
+CURVES = st.integers(2, 6).flatmap(
+    lambda n: st.tuples(
+        st.lists(st.floats(-3.1, 3.1), min_size=n, max_size=n),
+        st.lists(st.sampled_from([0.004, 0.02, 0.1, -0.02, -0.1]), min_size=n, max_size=n),
+        st.lists(st.sampled_from([1e-4, 4e-4, 1.2e-3, 2e-3, 6e-3]), min_size=n, max_size=n),
+    )
+)
+
+
+@settings(max_examples=40, deadline=None)
+@given(CURVES, st.integers(0, 9))
+def test_the_path_stays_within_the_tolerance_of_what_was_drawn(drawn, seed):
+    points = curves(*drawn)
+    feed = (
+        np.random.default_rng(seed)
+        .choice([0.002, 0.03, 0.1], 9)
+        .repeat(len(points) // 9 + 1)[1 : len(points)]
+    )
+    driven, spent = straightened(points, feed, H)
+    assert norm(driven - points).max() <= SPENT * H * (1 + 1e-9)
+    assert np.array_equal(driven[[0, -1]], points[[0, -1]])
+    assert (norm(np.diff(driven, axis=0)) > 0).all()
+    path = smooth(driven, H, passed=0.0, closes=True, allowed=Allowance(feed, feed / feed, A, J), spent=spent)
+    _, position, slope, _ = path.at(np.linspace(0, path.end, 1500))
+    assert distance_to(position, points).max() <= H / 3 * (1 + 1e-6)
+    assert distance_to(points, position).max() <= H / 3 + path.end / 1500
+    assert norm(slope).max() <= 1 + 1e-9
+
+
+def test_what_has_no_sharp_corner_is_left_as_it_is():
+    points = curves([0.0], [0.02], [1e-3])
+    driven, spent = straightened(points, np.ones(len(points) - 1), H)
+    assert driven is points
+    assert not spent.any()
+
+
+def test_two_corners_at_a_speck_become_one():
+    points = np.array([[-0.02, 0, 0], [0, 0, 0], [0, 1e-4, 0], [-0.02, 1e-4, 0]])
+    driven, spent = straightened(points, np.array([0.06, 0.06, 0.03]), H)
+    assert np.allclose(driven[2], [0, 5e-5, 0])
+    assert norm(driven[1:2] - driven[2:3]) == pytest.approx(1e-6)
+    assert spent[2] == pytest.approx(5.1e-5)
+
+
+def test_a_corner_between_curves_takes_less_time(monkeypatch):
+    points = curves([0.0, 1.5], [0.05, 0.05], [1e-3, 1e-3])
+    better = _time(points)
+    monkeypatch.setattr(approach, "SHARP", 9.0)
+    assert better < _time(points) - 0.05
+
+
+def _time(points):
+    planner = Planner(LIMITS, points[0])
+    return sum(leg.duration for leg in [*planner.stretches(moves(points, 0.03)), *planner.close()])
