@@ -27,10 +27,10 @@ class LateError(Exception):
     """Something took longer than PATIENCE."""
 
 
-def tolerant(folder, name):
-    """A shipped profile, with SETTINGS; its path."""
+def tolerant(folder, name, **settings):
+    """A shipped profile, with SETTINGS and these; its path."""
     text = find(name).read_text()
-    for key, value in SETTINGS.items():
+    for key, value in (SETTINGS | settings).items():
         text = re.sub(rf"(?m)^{key} = .*$", f"{key} = {value}", text)
     path = Path(folder) / f"{name}-soak.toml"
     path.write_text(text)

@@ -102,7 +102,7 @@ class Soak:
 
     def __init__(self, folder, asked):
         self.folder, self.random = folder, np.random.default_rng(asked.seed)
-        self.profile = tolerant(folder, "paper")
+        self.profile = tolerant(folder, "paper", period_ms=asked.period)
         self.machine = open_profile(str(self.profile))
         self.file = folder / "rings.gcode"
         self.file.write_text(rings(asked.layers))
@@ -132,14 +132,19 @@ class Soak:
     def one_print(self):
         """Until it is done; a time that is over ends it with Ctrl-C, and what is laid is judged."""
         first, seams, self.feed = self.far.written, [], 1.0
-        self.start("stream", self.file, "--profile", self.profile, "--drives", self.far.url)
+        fresh = "stream", self.file, "--profile", self.profile, "--drives", self.far.url
+        self.start(*fresh)
         while (code := self.life()) != 0:
             if self.over and not self.most:
                 break
             self.start("resume", "--drives", self.far.url)
-            if (seam := self.host.seam()) is None:
+            if (seam := self.host.seam()) is not None:
+                seams.append(Seam(self.bead.begin(seam[0]), seam[1]))
+            elif "begins it anew" in self.host.said and not seams:
+                self.host.gone()
+                self.start(*fresh)
+            else:
                 raise SystemExit(f"no resume: {self.host.said}")
-            seams.append(Seam(self.bead.begin(seam[0]), seam[1]))
         self.judge(first, seams, whole=code == 0)
         self.tally.prints += 1
         if not self.over:
@@ -251,6 +256,7 @@ def main():
     options.add_argument("--minutes", type=float, default=60.0)
     options.add_argument("--kills", type=int, default=0, help="so many kill -9, and nothing else")
     options.add_argument("--bus", choices=("slcan", "link"), default="slcan")
+    options.add_argument("--period", type=float, default=4.0, help="ms of a cycle of the drives")
     options.add_argument("--layers", type=int, default=100)
     options.add_argument("--pause", type=float, default=6.0, help="s between two events, on average")
     options.add_argument("--seed", type=int, default=1)
