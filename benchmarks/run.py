@@ -9,7 +9,19 @@ import sys
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
-HELPERS = {"run", "measure", "programs", "paths", "yardstick", "bound", "dense", "trapezoids"}
+HELPERS = {
+    "run",
+    "measure",
+    "programs",
+    "paths",
+    "yardstick",
+    "bound",
+    "dense",
+    "trapezoids",
+    "laid",
+    "hosts",
+    "far_side",
+}
 BY_HAND = {"chaos_drives"}
 """needs an idle machine and an hour; its cases are tests (tests/drives/test_processes.py)"""
 

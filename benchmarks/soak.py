@@ -1,243 +1,283 @@
-"""A print under an impatient operator and a bad power supply, compared with the dry run.
+"""A print under an impatient operator and a bad power supply, with real processes over a serial CAN adapter.
 
-    python benchmarks/soak.py --minutes 60 --seed 1
+    python benchmarks/soak.py --minutes 60          holds, overrides, faults, stops, kills, and resumes
+    python benchmarks/soak.py --kills 200           nothing but kill -9, at any moment
 
-For so many minutes of machine time the file is printed again and again on the simulated machine.
-At random moments the print is held and resumed, its feed changed, stopped by the emergency stop, or
-its host is killed; after the last two a new host takes it up from its journal, as ``cdhr resume`` does.
-At the end every millimetre of bead the far side executed is compared with the dry run's: laid once, or
-named: laid twice within the overlap that was stated. Memory is measured all along.
+The far side is a process of its own, and so is each host: ``cdhr stream``, then ``cdhr resume`` as often
+as it takes. Keys are pressed at its terminal, drives trip, the emergency stop is pressed, hosts are killed.
+At the end every setpoint that the far side executed is compared with the dry run: each millimetre of bead
+laid once, or named: laid twice within the overlap that was told. Memory is measured all along.
 """
 
 import argparse
 import json
-import resource
+import signal
+import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass, field
+import threading
+import time
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import KDTree
+from far_side import RECORD
+from hosts import PATIENCE, FarSide, Host, LateError, environment, resident, tolerant, until
+from laid import MENDED, Bead, Seam
 
-from cdhr_host.drives import LinkState, Loopback
-from cdhr_host.drives.rows import joined
-from cdhr_host.job.journal import read_journal
-from cdhr_host.job.printer import Printer
-from cdhr_host.job.program import Program, ProgramFile, proven
-from cdhr_host.job.recorder import Names, Recorder
-from cdhr_host.job.recovery import Resuming
-from cdhr_host.job.surface import JobState
-from cdhr_host.pipeline import Staircase, open_profile
-from cdhr_host.pipeline.rig import Rig
-from cdhr_host.profile import Profile
+from cdhr_host.pipeline import open_profile
 from cdhr_host.units import MM
-from cdhr_host.values import Array, Feedback, Setpoints
 
-ROOT = Path(__file__).resolve().parents[1]
-OVERLAP = 2.0 * MM
-TURN = 0.05
-BIN = 3.0 * MM
-FULL = 0.9
-"""share of a bin's clay from which on it is laid"""
+RADIUS, LAYER, FEED = 60.0, 1.25, 1200
+"""mm, mm, mm/min of the rings that are printed"""
+SETTLED = 20.0
+"""s of a host's life from which on its memory is compared"""
+HOURLY = {"hold": 40, "override": 40, "interrupt": 5, "fault": 4, "stop": 4, "kill": 7}
+"""how often each happens"""
 
 
-class Time:
-    """Machine time that passes as fast as it can be computed."""
-
-    speed = 1.0
-
-    def __init__(self) -> None:
-        self._now = 0.0
-
-    def now(self) -> float:
-        return self._now
-
-    def wait_until(self, when: float) -> None:
-        self._now = max(self._now, when)
+def rings(count):
+    """A program: rings of short chords and arcs in turn, one above the other, and back to the middle."""
+    chords = np.linspace(0.0, 2.0 * np.pi, 121)
+    lines = ["G21", "G90", "M83", f"G0 Z{LAYER + 5:g} F3000", f"G0 X{RADIUS:g} Y0"]
+    clay = 2.0 * np.pi * RADIUS * 5.0 * LAYER
+    for layer in range(count):
+        lines += [f";LAYER:{layer}", f"G0 Z{(layer + 1) * LAYER:.3f}"]
+        if layer % 2:
+            lines += [f"G3 X{-RADIUS:g} Y0 I{-RADIUS:g} J0 E{clay / 2:.4f} F{FEED}"]
+            lines += [f"G3 X{RADIUS:g} Y0 I{RADIUS:g} J0 E{clay / 2:.4f}"]
+        else:
+            x, y = RADIUS * np.cos(chords[1:]), RADIUS * np.sin(chords[1:])
+            lines += [f"G1 X{a:.4f} Y{b:.4f} E{clay / 120:.4f} F{FEED}" for a, b in zip(x, y, strict=True)]
+    return "\n".join([*lines, f"G0 Z{count * LAYER + 20:g} F3000", "G28", ""])
 
 
 @dataclass
 class Tally:
+    """What happened."""
+
+    events: dict = field(default_factory=dict)
     prints: int = 0
-    holds: int = 0
-    overrides: int = 0
-    stops: int = 0
-    kills: int = 0
-    lost_ticks: int = 0
-    stated: float = 0.0
-    once: float = 0.0
-    twice: float = 0.0
-    skipped: float = 0.0
-    memory: list[int] = field(default_factory=list)
+    bead_mm: float = 0.0
+    once_mm: float = 0.0
+    skipped_mm: float = 0.0
+    twice_mm: float = 0.0
+    told_mm: float = 0.0
+    beyond_mm: float = 0.0
+    astray: int = 0
+    astray_um: float = 0.0
+    wrong: list = field(default_factory=list)
+    seams: list = field(default_factory=list)
+
+
+class Memory(threading.Thread):
+    """kB of the far side and of the host, each second."""
+
+    def __init__(self, soak):
+        super().__init__(daemon=True)
+        self._soak, self.far, self.hosts = soak, [], []
+
+    def run(self):
+        while True:
+            time.sleep(1.0)
+            now, host = time.monotonic(), self._soak.host
+            if (far := resident(self._soak.far.process.pid)) is not None:
+                self.far.append((now, far))
+            if host is not None and now - host.began > SETTLED and (kb := host.resident) is not None:
+                self.hosts.append((now, kb))
+
+
+def growth(samples, parts=10):
+    """Medians of tenths of the time, MB, and how far the last is above the second, in percent."""
+    if len(samples) < 3 * parts:
+        return None
+    medians = [float(np.median([kb for _, kb in part])) for part in np.array_split(np.array(samples), parts)]
+    middle = float(np.median(medians))
+    spread = max(abs(each / middle - 1.0) for each in medians[1:])
+    return {"mb": [round(each / 1024, 1) for each in medians], "spread_percent": round(100 * spread, 2)}
 
 
 class Soak:
-    def __init__(self, profile: Profile, program: Program, folder: Path, seed: int) -> None:
-        self.random = np.random.default_rng(seed)
-        self.rig = Rig.from_profile(profile)
-        self.program, self.folder, self.profile = program, folder, profile
-        self.clock, self.tally = Time(), Tally()
-        self.plan = joined(
-            [rows for rows in Staircase(profile).setpoints(program.file.chunks()) if len(rows)]
-        )
-        self.ticks = 0
+    """One far side, and the hosts that come and go before it."""
 
-    def run(self, until: float) -> None:
-        while self.clock.now() < until:
+    def __init__(self, folder, asked):
+        self.folder, self.random = folder, np.random.default_rng(asked.seed)
+        self.profile = tolerant(folder, "paper", period_ms=asked.period)
+        self.machine = open_profile(str(self.profile))
+        self.file = folder / "rings.gcode"
+        self.file.write_text(rings(asked.layers))
+        self.bead = Bead(self.machine, iter([self.file.read_bytes()]))
+        self.pause, self.weights = asked.pause, HOURLY
+        self.most = asked.kills
+        if asked.kills:
+            self.weights = {"kill": 1}
+        self.far, self.tally = FarSide(folder, self.profile, asked.bus), Tally()
+        self.host, self.number, self.forks = None, 0, bool(asked.kills)
+        self.memory = Memory(self)
+        if not self.forks:
+            self.memory.start()
+        self.end = time.monotonic() + asked.minutes * 60.0
+
+    @property
+    def over(self):
+        if self.most:
+            return self.tally.events.get("kill", 0) >= self.most
+        return time.monotonic() > self.end
+
+    def run(self):
+        while not self.over:
             self.one_print()
-            self.tally.memory.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
-            print(f"{self.clock.now():8.0f} s  {self.tally.prints} prints", file=sys.stderr)
+        return self.far.end()
 
-    def one_print(self) -> None:
-        self.link = Loopback(self.profile, self.clock)
-        self.laid: list[Setpoints] = []
-        stated: list[float] = []
-        printer = self.host()
-        printer.adopt(self.program)
-        printer.start()
-        while not self.interrupted(printer):
-            if printer.state is JobState.DONE:
+    def one_print(self):
+        """Until it is done; a time that is over ends it with Ctrl-C, and what is laid is judged."""
+        first, seams, self.feed = self.far.written, [], 1.0
+        fresh = "stream", self.file, "--profile", self.profile, "--drives", self.far.url
+        self.start(*fresh)
+        while (code := self.life()) != 0:
+            if self.over and not self.most:
                 break
-        while printer.state is not JobState.DONE:
-            printer, overlap = self.taken_up()
-            stated.append(overlap)
-            while not self.interrupted(printer) and printer.state is not JobState.DONE:
-                pass
-        printer.close()
-        self.link.close()
+            self.start("resume", "--drives", self.far.url)
+            if (seam := self.host.seam()) is not None:
+                seams.append(Seam(self.bead.begin(seam[0]), seam[1]))
+            elif "begins it anew" in self.host.said and not seams:
+                self.host.gone()
+                self.start(*fresh)
+            else:
+                raise SystemExit(f"no resume: {self.host.said}")
+        self.judge(first, seams, whole=code == 0)
         self.tally.prints += 1
-        self.compare(stated)
+        if not self.over:
+            self.home()
 
-    def host(self) -> Printer:
-        if self.link.state is LinkState.CLOSED:
-            self.link.open()
-        printer = Printer(self.link, self.clock, recorder=Recorder(self.link, Names("-"), self.folder))
-        self.last = -1
-        printer.observe(self.executed)
-        return printer
+    def start(self, *arguments):
+        self.number += 1
+        self.host = Host(self.folder, self.number, [*arguments, "--yes"], forked=self.forks)
+        self.host.begun(under_way=not self.most or self.random.random() < 0.7)
 
-    def executed(self, rows: Setpoints, _: Feedback) -> None:
-        if self.last >= 0 and int(rows.tick[0]) > self.last + 1:
-            self.tally.lost_ticks += int(rows.tick[0]) - self.last - 1
-        self.last = int(rows.tick[-1])
-        if (rows.flow > 0.0).any():
-            self.laid.append(rows[rows.flow > 0.0])
+    def life(self):
+        """One host, until it is gone; its exit code."""
+        while self.host.ended is None:
+            time.sleep(min(float(self.random.exponential(self.pause)), 4.0 * self.pause))
+            if self.over and not self.most:
+                self.interrupt()
+            elif self.host.ended is None and self.host.journal.state != "done":
+                what = str(self.random.choice(list(self.weights), p=self.shares))
+                self.tally.events[what] = self.tally.events.get(what, 0) + 1
+                self.happens(what)
+        code = self.host.gone()
+        self.say(code)
+        return code
 
-    def interrupted(self, printer: Printer) -> bool:
-        """Let time pass, then do something to it; whether its host is gone."""
-        self.go(printer, float(self.random.exponential(6.0)))
-        if printer.state is not JobState.PRINTING:
-            return False
-        match self.random.integers(0, 10):
-            case 0 | 1 | 2 | 3:
-                self.held(printer)
-            case 4 | 5 | 6 | 7:
-                printer.override(feed=float(self.random.uniform(0.2, 2.0)))
-                self.tally.overrides += 1
-            case 8:
-                printer.emergency_stop("soak")
-                self.go(printer, 3.0)
-                self.tally.stops += 1
-                self.gone(printer)
-                return True
-            case 9:
-                self.tally.kills += 1
-                self.gone(None)
-                return True
-        return False
+    def happens(self, what):
+        """An event; one that nothing follows is a fault of ours, and the host is killed for it."""
+        try:
+            getattr(self, what)()
+        except LateError as error:
+            self.tally.wrong.append({"host": self.number, "hung": str(error)})
+            self.kill()
 
-    def held(self, printer: Printer) -> None:
-        printer.hold("soak")
-        while printer.state is JobState.HOLDING:
-            self.go(printer, TURN)
-        self.go(printer, float(self.random.uniform(0.0, 3.0)))
-        if printer.state is JobState.HELD:
-            printer.resume()
-            self.tally.holds += 1
+    @property
+    def shares(self):
+        weights = np.array(list(self.weights.values()), dtype=float)
+        return weights / weights.sum()
 
-    def gone(self, printer: Printer | None) -> None:
-        """The host ends without a word; the far side comes to rest by itself."""
-        if printer is not None:
-            printer.close()
-        self.link.stop()
-        while self.link.state is LinkState.STOPPING:
-            self.clock.wait_until(self.clock.now() + TURN)
-            self.link.feedback()
-        self.link.close()
+    def hold(self):
+        self.host.press(b" ")
+        self.host.becomes("held", "done", "fault")
+        time.sleep(float(self.random.uniform(0.0, 3.0)))
+        if self.host.ended is None and self.host.journal.state == "held":
+            self.host.press(b" ")
 
-    def taken_up(self) -> tuple[Printer, float]:
-        printer = self.host()
-        journal = read_journal(max(self.folder.glob("*.journal")))
-        way = Resuming(self.program, self.rig)
-        found = way.found(journal, printer.status().nozzle_G, self.link.stop_rows, OVERLAP)
-        printer.adopt(self.program)
-        printer.recover(found, goes_on=str(journal.path))
-        printer.turn()
-        printer.resume()
-        return printer, found.overlap
+    def override(self):
+        wanted = float(self.random.uniform(0.6, 1.8))
+        steps = round((wanted - self.feed) * 10)
+        self.feed = round(self.feed + steps / 10, 1)
+        self.host.press((b"+" if steps > 0 else b"-") * abs(steps))
 
-    def go(self, printer: Printer, seconds: float) -> None:
-        end = self.clock.now() + seconds
-        while self.clock.now() < end and printer.state is not JobState.DONE:
-            printer.turn()
-            self.clock.wait_until(self.clock.now() + TURN)
+    def interrupt(self):
+        self.host.process.send_signal(signal.SIGINT)
+        self.host.process.wait(PATIENCE)
+        self.feed = 1.0
 
-    def compare(self, stated: list[float]) -> None:
-        """Volumes in each millimetre of the program's bead against those laid."""
-        clay = self.plan.flow > 0.0
-        steps = np.linalg.norm(np.diff(self.plan.nozzle_G, axis=0, prepend=self.plan.nozzle_G[:1]), axis=1)
-        place = np.cumsum(np.where(clay, steps, 0.0))[clay]
-        bins = (place / BIN).astype(np.int64)
-        wanted = volumes(bins, self.plan.flow[clay], bins[-1] + 1)
-        laid = joined(self.laid)
-        nearest = KDTree(self.plan.nozzle_G[clay]).query(laid.nozzle_G)[1]
-        got = volumes(bins[nearest], laid.flow, bins[-1] + 1)
-        share = got / np.where(wanted > 0.0, wanted, 1.0)
-        self.tally.once += float((share >= FULL).sum()) * BIN
-        self.tally.skipped += float((share < FULL).sum()) * BIN
-        self.tally.twice += float(np.maximum(share - 1.0, 0.0)[share > 1.1].sum()) * BIN
-        self.tally.stated += sum(stated)
+    def fault(self):
+        self.far.say("fault")
+        self.host.process.wait(PATIENCE)
+        self.feed = 1.0
+
+    def stop(self):
+        self.far.say("stop")
+        self.host.process.wait(PATIENCE)
+        time.sleep(1.5)
+        self.feed = 1.0
+
+    def kill(self):
+        self.host.process.kill()
+        self.host.process.wait(PATIENCE)
+        self.feed = 1.0
+
+    def home(self):
+        """By hand, with the part taken off: G28 by the console."""
+        where = ["--profile", str(self.profile), "--drives", self.far.url]
+        command = [sys.executable, "-m", "cdhr_host", "jog", *where]
+        subprocess.run(command, input=b"G28\n", env=environment(), check=True, stdout=subprocess.DEVNULL)
+
+    def judge(self, first, seams, *, whole):
+        """The part of the record that is this print's."""
+        until("the record", lambda: True if self.far.written > first else None)
+        count = (self.far.written - first) // RECORD.itemsize
+        record = np.fromfile(self.far.file, RECORD, count=count, offset=first)
+        found = self.bead.judged(record, self.machine.canopen.position_unit, seams, whole=whole)
+        tally = self.tally
+        tally.bead_mm += (found.once + found.twice) / MM
+        tally.once_mm += found.once / MM
+        tally.skipped_mm += found.skipped / MM
+        tally.twice_mm += found.twice / MM
+        tally.beyond_mm += found.beyond / MM
+        tally.told_mm += sum(seam.stated for seam in seams) / MM
+        tally.astray += found.astray
+        tally.astray_um = max(tally.astray_um, found.astray_m * 1e6)
+        tally.seams += [(round(twice / MM, 2), round(stated / MM, 2)) for twice, stated in found.seams]
+        if found.skipped or found.beyond or found.astray:
+            tally.wrong.append({"print": tally.prints, "host": self.number, **asdict(found)})
+            print(json.dumps(tally.wrong[-1]), file=sys.stderr, flush=True)
+
+    def say(self, code):
+        minutes = (self.end - time.monotonic()) / 60.0
+        events = " ".join(f"{what} {count}" for what, count in sorted(self.tally.events.items()))
+        last = self.host.said.strip().splitlines()[-1:] if code not in (0, -9) else []
+        text = f"{minutes:6.1f} min left, host {self.number} ended with {code}: {events} {last}"
+        print(text, file=sys.stderr, flush=True)
 
 
-def volumes(bins: Array, flow: Array, count: int) -> Array:
-    return np.bincount(bins, weights=flow, minlength=count)
-
-
-def main() -> None:
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--smoke", action="store_true", help="three minutes")
+def main():
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    options.add_argument("--smoke", action="store_true", help="half a minute")
     options.add_argument("--minutes", type=float, default=60.0)
+    options.add_argument("--kills", type=int, default=0, help="so many kill -9, and nothing else")
+    options.add_argument("--bus", choices=("slcan", "link"), default="slcan")
+    options.add_argument("--period", type=float, default=4.0, help="ms of a cycle of the drives")
+    options.add_argument("--layers", type=int, default=100)
+    options.add_argument("--pause", type=float, default=6.0, help="s between two events, on average")
     options.add_argument("--seed", type=int, default=1)
-    options.add_argument("--file", type=Path, default=ROOT / "gcode" / "paper_ring_double.gcode")
-    options.add_argument("--profile", default="paper")
+    options.add_argument("--folder", type=Path, help="to keep what was written")
     asked = options.parse_args()
-    profile = open_profile(asked.profile)
-    program = proven(ProgramFile(asked.file), profile)
+    if asked.smoke:
+        asked.minutes, asked.layers, asked.pause = 0.5, 1, 3.0
     with tempfile.TemporaryDirectory() as folder:
-        soak = Soak(profile, program, Path(folder), asked.seed)
-        soak.run(180.0 if asked.smoke else asked.minutes * 60.0)
-    tally = soak.tally
-    half = len(tally.memory) // 2
-    print(
-        json.dumps(
-            {
-                "machine_minutes": round(soak.clock.now() / 60.0, 1),
-                "prints": tally.prints,
-                "holds": tally.holds,
-                "overrides": tally.overrides,
-                "emergency_stops": tally.stops,
-                "kills": tally.kills,
-                "lost_ticks": tally.lost_ticks,
-                "bead_laid_mm": round(tally.once / MM),
-                "bead_skipped_mm": round(tally.skipped / MM),
-                "bead_twice_mm": round(tally.twice / MM, 1),
-                "overlap_stated_mm": round(tally.stated / MM, 1),
-                "memory_growth_percent": round(100.0 * (tally.memory[-1] / tally.memory[half] - 1.0), 1),
-            },
-            indent=1,
-        )
-    )
+        where = asked.folder or Path(folder)
+        where.mkdir(parents=True, exist_ok=True)
+        soak = Soak(where, asked)
+        lost = soak.run()
+    record = {
+        **asdict(soak.tally),
+        "cycles_guessed": lost,
+        "memory_far": growth(soak.memory.far),
+        "memory_hosts": growth(soak.memory.hosts),
+    }
+    within = sum(twice <= stated + MENDED / MM for twice, stated in record["seams"])
+    print(json.dumps({**record, "seams": len(record["seams"]), "seams_as_told": within}, indent=1))
+    sys.exit(bool(soak.tally.wrong))
 
 
 if __name__ == "__main__":

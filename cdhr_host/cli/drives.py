@@ -20,13 +20,14 @@ app = typer.Typer(
     epilog=examples(
         "cdhr drives scan --drives slcan:/dev/ttyACM0@1000000",
         "cdhr drives read 3 0x6065 --drives socketcan:can0",
+        "cdhr drives write 3 'following error window' 10000 --drives socketcan:can0",
         "cdhr drives reset 3 --drives socketcan:can0",
     ),
     no_args_is_help=True,
 )
 Url = Annotated[str, typer.Option("--drives", metavar="URL", help="slcan:PATH@BITRATE or socketcan:CHANNEL.")]
 NodeId = Annotated[int, typer.Argument(metavar="NODE", help="Node id, 1-127.", min=1, max=127)]
-Object = Annotated[str, typer.Argument(metavar="INDEX[:SUB]", help="Object, such as 0x6065 or 0x1018:4.")]
+Object = Annotated[str, typer.Argument(metavar="OBJECT", help="0x6065, 0x1018:4, or its name in quotes.")]
 
 
 @app.command(epilog=examples("cdhr drives scan --drives slcan:/dev/ttyACM0@1000000"))
@@ -66,10 +67,12 @@ def status(*, drives: Url, profile: ProfileName = "paper") -> None:
 @app.command(epilog=examples("cdhr drives read 3 0x6065 --drives socketcan:can0"))
 def read(node: NodeId, object_: Object, *, drives: Url) -> None:
     """One object, with its name."""
+    from cdhr_host.drives.canopen.bus import object_place
     from cdhr_host.drives.commission import read_object
 
+    place = object_place(node, object_)
     with _bus(drives) as bus:
-        emit(read_object(bus, node, *_place(object_)))
+        emit(read_object(bus, node, *place))
 
 
 @app.command(epilog=examples("cdhr drives write 3 0x6065 10000 --drives socketcan:can0"))
@@ -81,10 +84,12 @@ def write(
     drives: Url,
 ) -> None:
     """Write one object and show what is read back."""
+    from cdhr_host.drives.canopen.bus import object_place
     from cdhr_host.drives.commission import write_object
 
+    place, number = object_place(node, object_), _number(value)
     with _bus(drives) as bus:
-        emit(write_object(bus, node, *_place(object_), _number(value)))
+        emit(write_object(bus, node, *place, number))
 
 
 @app.command(epilog=examples("cdhr drives reset 3 --drives socketcan:can0"))
@@ -101,6 +106,8 @@ def reference(*, drives: Url, profile: ProfileName = "paper") -> None:
     """The machine stands at its reference pose: remember it for each drive's serial number."""
     from cdhr_host.drives.reference import default_store
 
+    _real(drives)
+    _expect_reference(profile, "stored", 'reference = "stored", where drives do not know their place')
     with _link(drives, profile) as link:
         link.set_reference()
     emit(f"reference kept for six drives in {default_store()}")
@@ -110,15 +117,19 @@ def reference(*, drives: Url, profile: ProfileName = "paper") -> None:
 def home(*, drives: Url, profile: ProfileName = "paper") -> None:
     """Home every slider in turn, with little torque. The machine moves."""
     _real(drives)
-    machine = open_machine(profile)
-    if machine.canopen.reference != "homing":
-        raise Refusal(
-            f"cdhr: error: the drives of {profile} are not homed: [canopen] reference is "
-            f"'{machine.canopen.reference}'\nhint: cdhr drives reference, or reference = \"homing\""
-        )
+    _expect_reference(profile, "homing", 'cdhr drives reference, or reference = "homing"')
     with _link(drives, profile) as link:
         link.home()
     emit("six sliders homed, until the drives lose their power")
+
+
+def _expect_reference(profile: str, wanted: str, hint: str) -> None:
+    """Raises Refusal where the profile's drives find their reference otherwise."""
+    found = open_machine(profile).canopen.reference
+    if found != wanted:
+        raise Refusal(
+            f"cdhr: error: [canopen] reference of {profile} is '{found}', not '{wanted}'\nhint: {hint}"
+        )
 
 
 @contextmanager
@@ -154,14 +165,8 @@ def _real(url: str) -> None:
         raise Refusal(f"cdhr: error: '{url}' is no CAN bus\nhint: --drives slcan:PATH@BITRATE")
 
 
-def _place(text: str) -> tuple[int, int]:
-    """``0x1018:4`` -> index and sub-index."""
-    index, _, sub = text.partition(":")
-    return _number(index, 16), _number(sub or "0", 16)
-
-
-def _number(text: str, base: int = 0) -> int:
+def _number(text: str) -> int:
     try:
-        return int(text, base)
+        return int(text, 0)
     except ValueError:
         raise Refusal(f"cdhr: error: '{text}' is not a number") from None

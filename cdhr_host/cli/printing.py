@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from cdhr_host.drives import Clock, MachineLink
     from cdhr_host.job import RunSummary
     from cdhr_host.job.closed_loop import Loop
+    from cdhr_host.job.player import Observer
     from cdhr_host.job.printer import Printer
     from cdhr_host.job.program import Program
     from cdhr_host.job.recorder import Recorder
@@ -83,19 +84,18 @@ def printed(run: Run, log: Path | None) -> "RunSummary":
     run.source.still_the_same()
     with ExitStack() as stack:
         out = stack.enter_context(_kept(log, run)) if log else None
-        show = _shown(run, stack.enter_context(Progress("printing")))
-
-        def done(rows: "Setpoints", feedback: "Feedback") -> None:
-            show(rows)
-            if out is not None:
-                out.add_run(rows, feedback)
-
+        progress = stack.enter_context(Progress("printing"))
+        done = _ignored if out is None else out.add_run
         if run.loop is not None:
-            return _in_a_loop(run, run.loop, done)
-        return _by_printer(run, done, stack.enter_context(Keys()))
+            return _in_a_loop(run, run.loop, done, _shown(run, progress))
+        return _by_printer(run, done, progress, stack.enter_context(Keys()))
 
 
-def _by_printer(run: Run, done: "Callable[[Setpoints, Feedback], None]", keys: Keys) -> "RunSummary":
+def _ignored(rows: "Setpoints", feedback: "Feedback") -> None:
+    """No log is kept."""
+
+
+def _by_printer(run: Run, done: "Observer", progress: Progress, keys: Keys) -> "RunSummary":
     """Have a printer do it, in this thread; raises what brought it to a fault, at rest."""
     from cdhr_host.job import Tally
     from cdhr_host.job.printer import Printer
@@ -110,6 +110,7 @@ def _by_printer(run: Run, done: "Callable[[Setpoints, Feedback], None]", keys: K
         _begun(printer, run)
         while printer.state is not JobState.DONE and not _ended(printer, run, keys):
             printer.turn()
+            _show(printer, progress, run.clock.speed)
             printer.wait()
     finally:
         printer.close()
@@ -117,6 +118,17 @@ def _by_printer(run: Run, done: "Callable[[Setpoints, Feedback], None]", keys: K
         raise printer.fault
     interrupted = printer.state is not JobState.DONE
     return tally.summary(run.machine.drives.period, interrupted=interrupted, timing=run.link.timing())
+
+
+def _show(printer: "Printer", progress: Progress, speed: float) -> None:
+    """Where the print is in its plan, and what the machine does while it does not print."""
+    from cdhr_host.job.surface import JobState
+
+    if not progress.due or (done := (status := printer.status()).progress) is None:
+        return
+    parts = [] if status.state is JobState.PRINTING else [status.state.value]
+    parts += [f"layer {done.layer}/{done.layers}"] if done.layers else []
+    progress.show(done.fraction, "  ".join([*parts, f"line {done.line}"]), left=done.left / speed)
 
 
 def _begun(printer: "Printer", run: Run) -> None:
@@ -137,7 +149,7 @@ def _ended(printer: "Printer", run: Run, keys: Keys) -> bool:
     if printer.state is JobState.FAULT:
         return True
     if run.stop():
-        if can(printer.state, Word.HOLD) and printer.state is not JobState.HELD:
+        if can(printer.state, Word.HOLD) and printer.state not in {JobState.HOLDING, JobState.HELD}:
             printer.hold("stopped on request")
         return printer.state is JobState.HELD
     keys.obey(printer)
@@ -165,7 +177,7 @@ def _told(event: "Event") -> None:
         say(f"cdhr: {event.text}")
 
 
-def _in_a_loop(run: Run, loop: "Loop", done: "Callable[[Setpoints, Feedback], None]") -> "RunSummary":
+def _in_a_loop(run: Run, loop: "Loop", done: "Observer", show: "Callable[[Setpoints], None]") -> "RunSummary":
     """Stretch after stretch through a simulated control loop, each from where the last came to rest."""
     import numpy as np
 
@@ -178,6 +190,7 @@ def _in_a_loop(run: Run, loop: "Loop", done: "Callable[[Setpoints, Feedback], No
 
     def note(rows: "Setpoints", feedback: "Feedback") -> None:
         start[0] = rows.slider[-1]
+        show(rows)
         done(rows, feedback)
 
     summaries: list[RunSummary] = []

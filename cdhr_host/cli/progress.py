@@ -46,6 +46,11 @@ class Progress:
         self._due = self._start if live else self._start + FIRST_LINE
         self._bar = _bar() if live else None
 
+    @property
+    def due(self) -> bool:
+        """Whether ``show`` would show anything now."""
+        return time.monotonic() >= self._due
+
     def show(self, fraction: float | None, where: str, left: float | None = None) -> None:
         """``fraction`` of the task done, 0 to 1; ``left`` in s, guessed from the fraction when not given."""
         now = time.monotonic()

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from cdhr_host.drives.access import ObjectAccess
-from cdhr_host.drives.canopen.bus import COUPLER, NODES, Abort, node_name, object_name
+from cdhr_host.drives.canopen.bus import COUPLER, NODES, Abort, check_number, node_name, object_name
 from cdhr_host.drives.canopen.cia402 import DISABLE_VOLTAGE, FAULT_RESET, State, decoded
 from cdhr_host.drives.canopen.emergencies import meaning
 from cdhr_host.drives.canopen.verified import read, refused
@@ -78,6 +78,7 @@ def read_object(bus: ObjectAccess, node: int, index: int, sub: int) -> str:
 
 def write_object(bus: ObjectAccess, node: int, index: int, sub: int, value: int) -> str:
     """Write, then what is read back; raises DriveError."""
+    check_number(node, index, sub, value)
     try:
         bus.write(node, index, sub, value)
     except Abort as abort:

@@ -24,6 +24,8 @@ from cdhr_host.values import Setpoints
 
 TRIES: Final = 8
 """how often a change is worked out anew when the link meanwhile has gone on"""
+OVERTAKEN: Final = frozenset({"late-revision", "state"})
+"""kinds of a change that the link refuses because it has gone on, or stops by itself, meanwhile"""
 SHARES: Final = (1.0, 0.6, 0.3, 0.1)
 """of a change, tried in this order"""
 SAME: Final = 1e-9
@@ -102,8 +104,10 @@ class Changes:
             try:
                 change(min(begun + ahead, feeder.next_tick))
             except DriveError as error:
-                if error.problems[0].kind != "late-revision":
+                if error.problems[0].kind not in OVERTAKEN:
                     raise
+                if not feeder.plays:  # why the far side stops is told with its answers
+                    return
                 ahead = 2 * (feeder.changeable - begun) + 1
             else:
                 return

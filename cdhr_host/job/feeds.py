@@ -15,7 +15,7 @@ from functools import partial
 from typing import Final
 
 from cdhr_host.errors import CdhrError, MotionError
-from cdhr_host.job.changes import Changes
+from cdhr_host.job.changes import OVERTAKEN, Changes
 from cdhr_host.job.feeder import KEPT, Feeder
 from cdhr_host.motion.leg import AS_PROGRAMMED, FeedOverride
 from cdhr_host.motion.playback import Pace, Start, landing, ramp
@@ -166,9 +166,9 @@ class Feeds:
         for pace in choices(ahead, shaped, tick, abs(target - start.rate), waits=(0.0,)):
             try:
                 feeder.revise(score.with_part(Part(tick, other, pace)), first)
-            except CdhrError:
-                if not feeder.plays:  # a fault of the far side, which is told once
-                    raise
+            except CdhrError as error:
+                if not feeder.plays and error.problems[0].kind not in OVERTAKEN:
+                    raise  # a fault of the far side is told once
                 continue
             self._changes.wanted = target
             return True

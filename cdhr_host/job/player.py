@@ -311,7 +311,9 @@ class Player:
             self.staircase.stand_at(done.standing_G, done.upper)
 
     def hold(self) -> None:
-        """Come to rest on the path."""
+        """Come to rest on the path; what is coming to rest already is left to it."""
+        if self.changes.wanted == 0.0:
+            return
         clean = self.profile.job.hold == "clean" and self.kind is Kind.PROGRAM
         self.changes.pace(0.0, late=self.staircase.rig.air.change_lead if clean else 0.0)
 

@@ -16,11 +16,14 @@ from cdhr_host.errors import JobError, Problem
 from cdhr_host.job.surface import Event, JobState, Reply, Status, Surface
 from cdhr_host.profile.schema import Profile
 from cdhr_host.serve.folder import Folder
-from cdhr_host.serve.model import View, objects
+from cdhr_host.serve.model import ACTIVE, View, objects
+from cdhr_host.serve.names import shown
 from cdhr_host.serve.words import Modes
 
 KEPT: Final = 500
 """messages remembered"""
+BUSY: Final = ACTIVE | {JobState.PROVING, JobState.STOPPING}
+"""a program is under way or being proven"""
 LOOK: Final = 0.25
 """s between two looks at the state while it is waited for"""
 
@@ -158,6 +161,15 @@ class Host:
             self.say("echo: going to the reference pose first")
             await self.run("G28")
         self.surface.start()
+
+    def delete(self, name: str) -> None:
+        """Remove a program; JobError while it is proven or printed."""
+        name = self.folder.entry(name).name
+        progress = self.status().progress
+        if progress is not None and progress.file == name and self.state in BUSY:
+            hint = "cancel the print first"
+            raise JobError(Problem("state", f"'{shown(name)}' is being printed", hint=hint))
+        self.folder.delete(name)
 
     async def until(self, reached: Callable[[JobState], bool]) -> Status:
         """Wait for a state."""

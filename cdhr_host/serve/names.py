@@ -12,7 +12,7 @@ DEPTH_MAX: Final = 4
 PART_MAX: Final = 180
 """bytes of UTF-8 in one part of a name; file systems end at 255"""
 
-_FORBIDDEN: Final = re.compile(r'[\x00-\x1f\x7f-\x9f<>:"|?*\\\u202a-\u202e\u2066-\u2069]')
+_FORBIDDEN: Final = re.compile(r'[\x00-\x1f\x7f-\x9f<>:";|?*\\\u202a-\u202e\u2066-\u2069]')
 _DEVICES: Final = re.compile(r"(?i)(?:con|prn|aux|nul|com[0-9]|lpt[0-9])(?:\..*)?\Z")
 
 

@@ -71,8 +71,16 @@ def test_reset_leaves_a_drive_switched_off(url):
 
 def test_numbers_and_places_are_checked(url):
     result = drives("read", "3", "0x60zz", "--drives", url)
+    assert result.exit_code == 6
+    assert "'0x60zz' is no object of drive 3" in result.stderr
+    result = drives("write", "3", "0x6065", "ten", "--drives", url)
     assert result.exit_code == 2
-    assert "'0x60zz' is not a number" in result.stderr
+    assert "'ten' is not a number" in result.stderr
+    before = drives("read", "3", "following error window", "--drives", url).stdout
+    result = drives("write", "3", "Following Error Window", "99999999999", "--drives", url)
+    assert result.exit_code == 6
+    assert "99999999999 does not fit 0x6065:00 Following error window: 0 to 4294967295" in result.stderr
+    assert drives("read", "3", "0x6065", "--drives", url).stdout == before
 
 
 @pytest.mark.parametrize("command", [["scan"], ["home"], ["reference"]])
@@ -80,6 +88,12 @@ def test_simulated_drives_in_this_process_have_no_bus(command):
     result = drives(*command, "--drives", "loopback:")
     assert result.exit_code == 2
     assert "'loopback:'" in result.stderr
+
+
+def test_drives_that_are_not_known_are_refused_with_the_nearest():
+    result = drives("scan", "--drives", "slcn:/dev/null")
+    assert result.exit_code == 6
+    assert "did you mean slcan:/dev/null?" in result.stderr
 
 
 def test_a_path_that_is_no_adapter_is_refused():

@@ -5,7 +5,7 @@ from bench import Bench
 from trajectories import PAPER
 
 from cdhr_host.drives import commission
-from cdhr_host.drives.canopen.bus import Bus
+from cdhr_host.drives.canopen.bus import Bus, object_place
 from cdhr_host.drives.canopen.cia402 import State
 from cdhr_host.drives.canopen.load import bus_load, bus_share, frame_bits
 from cdhr_host.drives.timing import Lateness
@@ -37,6 +37,47 @@ def test_objects_are_read_and_written_with_their_names(bench):
         commission.write_object(bench.bus, 2, 0x6041, 0, 1)
     with pytest.raises(DriveError, match=r"0x5FFF:00 cannot be read: .*Object does not exist"):
         commission.read_object(bench.bus, 2, 0x5FFF, 0)
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("0x6065", (0x6065, 0)),
+        ("1018:4", (0x1018, 4)),
+        ("0x1018:0x0A", (0x1018, 10)),
+        ("Following  Error Window", (0x6065, 0)),
+        ("serial number", (0x1018, 4)),
+        ("identity object: vendor-id", (0x1018, 1)),
+    ],
+)
+def test_objects_have_numbers_and_names(text, place):
+    assert object_place(3, text) == place
+
+
+@pytest.mark.parametrize(
+    ("text", "near"),
+    [("folowing eror window", "did you mean 'following error window'"), ("0x6065:-1", ""), ("0x1FFFFF", "")],
+)
+def test_objects_that_are_none_are_refused_with_the_nearest_name(text, near):
+    with pytest.raises(DriveError, match="is no object of drive 3") as caught:
+        object_place(3, text)
+    assert near in caught.value.problems[0].hint
+
+
+@pytest.mark.parametrize(
+    ("index", "value", "limits"),
+    [
+        (0x6065, 1 << 32, "0 to 4294967295"),
+        (0x6065, -1, "0 to 4294967295"),
+        (0x6060, 128, "-128 to 127"),
+        (0x607A, -(1 << 31) - 1, "-2147483648 to 2147483647"),
+    ],
+)
+def test_numbers_that_do_not_fit_are_refused_and_not_cut(bench, index, value, limits):
+    before = bench.far.drives[2].values[index, 0]
+    with pytest.raises(DriveError, match=f"{value} does not fit .*: {limits}"):
+        commission.write_object(bench.bus, 3, index, 0, value)
+    assert bench.far.drives[2].values[index, 0] == before
 
 
 def test_status_and_reset_of_a_drive_in_fault(bench):

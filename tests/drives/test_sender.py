@@ -19,11 +19,11 @@ from cdhr_host.drives.rows import joined
 from cdhr_host.drives.sender import SenderLink
 from cdhr_host.drives.sender.far import CAPACITY
 from cdhr_host.drives.sender.ring import FEEDBACK, SETPOINTS, Ring, feedback, packed, setpoints, width
-from cdhr_host.errors import DriveError
+from cdhr_host.errors import DriveError, Problem
 from cdhr_host.job import stream
 from cdhr_host.motion.hold import path_true_stop
 from cdhr_host.plant import Machine
-from cdhr_host.values import Setpoints
+from cdhr_host.values import Feedback, Setpoints
 
 ROOT = Path(__file__).resolve().parents[2]
 ZERO = np.zeros(6)
@@ -265,3 +265,31 @@ def _zombie(pid):
         return Path(f"/proc/{pid}/stat").read_text().rsplit(") ", 1)[1].startswith("Z")
     except FileNotFoundError:
         return True
+
+
+class Pipe:
+    """A sender that trips just when it is asked something."""
+
+    def __init__(self, *messages):
+        self.messages = list(messages)
+
+    def send(self, _):
+        pass
+
+    def poll(self, _=0.0):
+        return bool(self.messages)
+
+    def recv(self):
+        return self.messages.pop(0)
+
+
+def test_a_fault_that_comes_before_an_answer_is_told_once(tmp_path):
+    link = SenderLink("slcan:nowhere@1000000", PATIENT, tmp_path / "references.json")
+    link._process, link._status = object(), np.zeros(16, dtype=np.int64)
+    link._results, link._progress = Ring(width(FEEDBACK, Feedback), 16), time.monotonic()
+    link._pipe = Pipe(("fault", (Problem("underrun", "ran dry"),)), ("done", None))
+    assert link._ask("revise") is None
+    with pytest.raises(DriveError, match="ran dry"):
+        link.feedback()
+    assert len(link.feedback()) == 0
+    link._results.close()

@@ -64,7 +64,7 @@ def test_a_print_is_shown_and_held(tmp_path: Path, width: int, height: int) -> N
             await page.until("by('messages').textContent.includes('layer 1 of 2')")
             bottom = await page.eval("by('line').getBoundingClientRect().bottom")
             assert width < 500 or bottom <= height
-            await page.eval("Promise.all(document.getAnimations().map((each) => each.finished)).then(() => 1)")
+            await page.eval("Promise.all(document.getAnimations().map((bar) => bar.finished)).then(() => 1)")
             if PICTURES:
                 await page.picture(Path(PICTURES) / f"page-{width}.png", whole=width < 500)
             await page.eval("by('hold').click()")

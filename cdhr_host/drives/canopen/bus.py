@@ -1,7 +1,9 @@
 """SDO, NMT and EMCY by the ``canopen`` library, without a thread: whoever waits, reads the bus."""
 
+import difflib
 import logging
 import queue
+import re
 import struct
 from collections import Counter
 from collections.abc import Callable
@@ -29,6 +31,7 @@ COUPLER: Final = 7
 HOST: Final = 127
 SIGNED: Final = (2, 3, 4)
 """data types INTEGER8, 16 and 32, CiA 301"""
+NUMBERS: Final = re.compile(r"(?:0x)?([0-9a-f]{4})(?::(?:0x)?([0-9a-f]{1,2}))?", re.IGNORECASE)
 ATTEMPTS: Final = 3
 """times a bus is scanned on which nobody answers: adapters and nodes may be waking up"""
 SCAN: Final = 0.4
@@ -67,6 +70,49 @@ def number_of(raw: bytes, node: int, index: int, sub: int) -> int:
     variable = dictionary(node).get_variable(index, sub)
     signed = variable is not None and variable.data_type in SIGNED
     return int.from_bytes(raw, "little", signed=signed)
+
+
+def object_place(node: int, text: str) -> tuple[int, int]:
+    """``0x1018:4``, ``6065`` or a name of the dictionary -> index and sub-index.
+
+    Numbers are hexadecimal. Raises DriveError, with the nearest name for one that is not known.
+    """
+    if numbers := NUMBERS.fullmatch(text.strip()):
+        return int(numbers[1], 16), int(numbers[2] or "0", 16)
+    known = _names(node)
+    if (place := known.get(" ".join(text.lower().split()))) is not None:
+        return place
+    near = difflib.get_close_matches(text.lower(), known, n=1, cutoff=0.4)
+    hint = f"did you mean '{near[0]}'?" if near else "0x6065 or 0x1018:4, or a name in quotes"
+    raise DriveError(Problem("object", f"'{text}' is no object of {node_name(node)}", hint=hint))
+
+
+@cache
+def _names(node: int) -> dict[str, tuple[int, int]]:
+    """Index and sub-index by name, in small letters; an entry of a record as ``record: entry`` too."""
+    found: dict[str, tuple[int, int]] = {}
+    for index, entry in dictionary(node).items():
+        if isinstance(entry, canopen.objectdictionary.ODVariable):
+            found.setdefault(entry.name.lower(), (index, 0))
+            continue
+        for sub, part in entry.items():
+            found.setdefault(f"{entry.name}: {part.name}".lower(), (index, sub))
+            found.setdefault(part.name.lower(), (index, sub))
+    return found
+
+
+def check_number(node: int, index: int, sub: int, value: int) -> None:
+    """DriveError for a number that the object cannot hold."""
+    variable = dictionary(node).get_variable(index, sub)
+    bits = len(variable) if variable is not None else 32
+    signed = variable is None or variable.data_type in SIGNED
+    unsigned = variable is None or variable.data_type not in SIGNED
+    low, high = -(1 << bits - 1) if signed else 0, (1 << bits - 1 + unsigned) - 1
+    if not low <= value <= high:
+        name = object_name(node, index, sub)
+        raise DriveError(
+            Problem("value", f"{value} does not fit {name}: {low} to {high}", value=value, limit=high)
+        )
 
 
 def object_bytes(node: int, index: int, sub: int, value: int, size: int | None = None) -> bytes:

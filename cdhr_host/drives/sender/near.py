@@ -43,6 +43,7 @@ class SenderLink:
         self._url, self._store = url, store
         self._process: BaseProcess | None = None
         self._fault: DriveError | None = None
+        self._untold = False
         self._tail = np.zeros(6)
         self._next_tick: int | None = None
         self._fed = self._collected = self._seen_cycles = 0
@@ -207,7 +208,7 @@ class SenderLink:
         self._process = context.Process(target=run, args=(spec, far), name="cdhr-sender", daemon=True)
         self._process.start()
         far.close()
-        self._fault = None
+        self._fault, self._untold = None, False
         self._progress = time.monotonic()
 
     def _end(self) -> None:
@@ -245,7 +246,7 @@ class SenderLink:
                     raise self._dead("does not answer")
                 kind, answer = self._pipe.recv()
                 if kind == "fault":
-                    self._fault = DriveError(answer)
+                    self._fault, self._untold = DriveError(answer), True
                     continue
                 break
         except (EOFError, OSError) as error:
@@ -260,6 +261,9 @@ class SenderLink:
         if self._process is None:
             raise DriveError(Problem("state", "the drives are closed, not open"))
         self._read_status()
+        if self._untold and self._fault is not None:
+            self._untold = False
+            raise self._fault
         try:
             while self._pipe.poll():
                 _, problems = self._pipe.recv()

@@ -13,10 +13,8 @@ from cdhr_host.errors import JobError
 from cdhr_host.serve.host import Host, problem_text
 from cdhr_host.serve.model import chosen, halted, host_state, object_names
 from cdhr_host.serve.names import shown
+from cdhr_host.serve.params import Fields, Params, fields_of, text_of
 from cdhr_host.serve.script import Executor
-
-Params = dict[str, Any]
-Fields = dict[str, list[str] | None]
 
 
 class EndpointError(Exception):
@@ -57,7 +55,7 @@ class Endpoints:
             "objects/query": self._query,
             "objects/subscribe": self._subscribe,
             "gcode/help": lambda _, __: executor.help(),
-            "gcode/script": lambda _, params: self._do(_text(params, "script")),
+            "gcode/script": lambda _, params: self._do(text_of(params, "script")),
             "gcode/restart": lambda _, __: self._do("FIRMWARE_RESTART"),
             "gcode/firmware_restart": lambda _, __: self._do("FIRMWARE_RESTART"),
             "gcode/subscribe_output": self._subscribe_output,
@@ -104,10 +102,10 @@ class Endpoints:
         }
 
     def _query(self, _: Session, params: Params) -> dict[str, Any]:
-        return self._status(_wanted(params))
+        return self._status(fields_of(params))
 
     def _subscribe(self, session: Session, params: Params) -> dict[str, Any]:
-        wanted = _wanted(params)
+        wanted = fields_of(params)
         result = self._status(wanted)
         session.status = Subscription(_template(params), wanted, result["status"])
         return result
@@ -125,17 +123,3 @@ def _template(params: Params) -> dict[str, Any]:
     if not isinstance(template, dict):
         raise TypeError("response_template")
     return template
-
-
-def _wanted(params: Params) -> Fields:
-    found = params["objects"]
-    if not isinstance(found, dict) or len(found) > 200:
-        raise TypeError("objects")
-    return {str(name): None if keys is None else [str(key) for key in keys] for name, keys in found.items()}
-
-
-def _text(params: Params, name: str) -> str:
-    value = params[name]
-    if not isinstance(value, str):
-        raise TypeError(name)
-    return value

@@ -15,7 +15,7 @@ from cdhr_host.serve.script import Executor
 from cdhr_host.serve.web.gate import PARSER_LOG, Gates
 from cdhr_host.serve.web.guard import LOG, Guard, guarded, refuse
 from cdhr_host.serve.web.methods import Methods, RpcError, gcodes_name
-from cdhr_host.serve.web.octoprint import OctoPrint
+from cdhr_host.serve.web.octoprint import OctoPrint, resource_of
 from cdhr_host.serve.web.sockets import Sockets
 from cdhr_host.serve.web.uploads import CHUNK, Form, reason, receive
 
@@ -37,6 +37,7 @@ GETS: Final = {
     "printer": ("info",),
     "printer.objects": ("list",),
     "printer.gcode": ("help",),
+    "printer.query_endstops": ("status",),
 }
 POSTS: Final = {
     "printer": ("emergency_stop", "restart", "firmware_restart"),
@@ -55,6 +56,7 @@ class HttpDoor:
         self._host = host
         self._executor = executor
         self._guard = guard
+        self._octoprint = OctoPrint(host, executor)
         self._sockets: Sockets | None = None
         self._runner: web.AppRunner | None = None
         self._server: asyncio.Server | None = None
@@ -88,7 +90,7 @@ class HttpDoor:
         )
         assert self._sockets is not None
         app.add_routes([web.get(path, _page(*page)) for path, page in PAGE.items()])
-        app.add_routes(OctoPrint(self._host, self._executor).routes())
+        app.add_routes(self._octoprint.routes())
         app.add_routes([web.get(_path(name), self._call(name)) for name in _names(GETS)])
         app.add_routes([web.post(_path(name), self._call(name)) for name in _names(POSTS)])
         app.add_routes(
@@ -155,10 +157,12 @@ class HttpDoor:
 
     async def _octoprint_upload(self, request: web.Request) -> web.Response:
         form = await self._received(request)
+        name = form.entry.name
+        if form.wants("select") or form.wants("print"):
+            self._octoprint.select(name)
         if form.wants("print"):
             await self._started(form.entry)
-        name = form.entry.name
-        resource = f"{request.scheme}://{request.host}/api/files/local/{name}"
+        resource = f"{request.scheme}://{request.host}{resource_of(name)}"
         local = {
             "name": name.split("/")[-1],
             "display": name,

@@ -3,6 +3,7 @@
 import os
 import platform
 import re
+import time
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from itertools import count
@@ -14,12 +15,12 @@ from cdhr_host.serve.folder import Entry
 from cdhr_host.serve.host import Host, Message
 from cdhr_host.serve.model import chosen, halted, host_state, object_names
 from cdhr_host.serve.names import shown
+from cdhr_host.serve.params import Fields, Params, fields_of, text_of
 from cdhr_host.serve.script import Executor
 from cdhr_host.serve.web.metadata import described
 from cdhr_host.serve.web.store import Store
 from cdhr_host.serve.web.uploads import reason
 
-Params = dict[str, Any]
 Result = Any
 Method = Callable[["Session", Params], Awaitable[Result] | Result]
 
@@ -41,7 +42,7 @@ class Session:
     """One client of the methods."""
 
     number: int = 0
-    subscribed: dict[str, list[str] | None] = field(default_factory=dict)
+    subscribed: Fields = field(default_factory=dict)
     sent: dict[str, dict[str, Any]] = field(default_factory=dict)
     lasting: bool = False
     """a websocket: it can be told things later"""
@@ -67,7 +68,7 @@ class Methods:
             "server.database.get_item": self._get_item,
             "server.database.post_item": self._post_item,
             "server.database.delete_item": self._delete_item,
-            "server.files.list": lambda _, __: [_listed(entry) for entry in host.folder.entries()],
+            "server.files.list": self._list,
             "server.files.roots": self._roots,
             "server.files.get_directory": self._directory,
             "server.files.metadata": self._metadata,
@@ -118,10 +119,10 @@ class Methods:
         return "ok"
 
     async def _script(self, _: Session, params: Params) -> str:
-        return await self._do(_text(params, "script"))
+        return await self._do(text_of(params, "script"))
 
     async def _start(self, _: Session, params: Params) -> str:
-        name = self.host.folder.entry(_text(params, "filename")).name
+        name = self.host.folder.entry(text_of(params, "filename")).name
         return await self._do(f'SDCARD_PRINT_FILE FILENAME="{name}"')
 
     def _server_info(self, _: Session, __: Params) -> Result:
@@ -155,16 +156,16 @@ class Methods:
         }
 
     def _query(self, _: Session, params: Params) -> Result:
-        return {"eventtime": self.host.monotonic(), "status": self._chosen(_wanted(params))}
+        return {"eventtime": self.host.monotonic(), "status": self._chosen(fields_of(params))}
 
     def _subscribe(self, session: Session, params: Params) -> Result:
-        wanted = _wanted(params)
+        wanted = fields_of(params)
         found = self._chosen(wanted)
         if session.lasting:
             session.subscribed, session.sent = wanted, found
         return {"eventtime": self.host.monotonic(), "status": found}
 
-    def _chosen(self, wanted: dict[str, list[str] | None]) -> dict[str, dict[str, Any]]:
+    def _chosen(self, wanted: Fields) -> dict[str, dict[str, Any]]:
         return chosen(self.host.objects(wanted), wanted)
 
     def _gcode_store(self, _: Session, params: Params) -> Result:
@@ -174,9 +175,17 @@ class Methods:
     def _roots(self, _: Session, __: Params) -> Result:
         return [{"name": "gcodes", "path": str(self.host.folder.root), "permissions": "rw"}]
 
+    def _list(self, _: Session, params: Params) -> Result:
+        here = params.get("root", "gcodes") == "gcodes"
+        return [_listed(entry) for entry in self.host.folder.entries()] if here else []
+
     def _directory(self, _: Session, params: Params) -> Result:
         """Only the first level: folders are named, not walked."""
-        inside = str(params.get("path", "gcodes")).strip("/").removeprefix("gcodes").strip("/")
+        root, _, inside = str(params.get("path", "gcodes")).strip("/").partition("/")
+        if root != "gcodes":
+            raise RpcError(400, f"Invalid root path ({shown(root)})")
+        if inside and inside not in self.host.folder.folders():
+            raise RpcError(404, f"Directory does not exist ({shown(inside)})")
         prefix = f"{inside}/" if inside else ""
         entries = [entry for entry in self.host.folder.entries() if entry.name.startswith(prefix)]
         here = [entry for entry in entries if "/" not in entry.name.removeprefix(prefix)]
@@ -193,36 +202,29 @@ class Methods:
         }
 
     def _metadata(self, _: Session, params: Params) -> Result:
-        return described(self.host.folder, gcodes_name(_text(params, "filename")))
+        return described(self.host.folder, gcodes_name(text_of(params, "filename")))
 
     def _delete(self, _: Session, params: Params) -> Result:
-        name = gcodes_name(_text(params, "path"))
-        progress = self.host.status().progress
-        if progress is not None and progress.file == name and host_busy(self.host):
-            raise RpcError(403, f"'{shown(name)}' is being printed")
-        self.host.folder.delete(name)
+        name = gcodes_name(text_of(params, "path"))
+        self.host.delete(name)
         return {"item": {"path": name, "root": "gcodes"}, "action": "delete_file"}
 
     def _get_item(self, _: Session, params: Params) -> Result:
-        space, key = _text(params, "namespace"), params.get("key")
+        space, key = text_of(params, "namespace"), params.get("key")
         value = self.store.get(space, key)
         if value is None:
-            raise RpcError(404, f"nothing is stored as '{shown(space)}' '{shown(str(key))}'")
+            below = "" if key is None else f" '{shown(str(key))}'"
+            raise RpcError(404, f"nothing is stored as '{shown(space)}'{below}")
         return {"namespace": space, "key": key, "value": value}
 
     def _post_item(self, _: Session, params: Params) -> Result:
-        space, key = _text(params, "namespace"), _text(params, "key")
+        space, key = text_of(params, "namespace"), params["key"]
         self.store.put(space, key, params.get("value"))
         return {"namespace": space, "key": key, "value": params.get("value")}
 
     def _delete_item(self, _: Session, params: Params) -> Result:
-        space, key = _text(params, "namespace"), _text(params, "key")
+        space, key = text_of(params, "namespace"), params["key"]
         return {"namespace": space, "key": key, "value": self.store.delete(space, key)}
-
-
-def host_busy(host: Host) -> bool:
-    """Whether a program is under way or being proven."""
-    return host.state.value not in {"idle", "ready", "done", "stopped", "fault"}
 
 
 def gcodes_name(name: str) -> str:
@@ -232,7 +234,6 @@ def gcodes_name(name: str) -> str:
 
 def proc_stats() -> dict[str, Any]:
     """What Moonraker tells of its machine; only what is cheap."""
-    times = os.times()
     return {
         "moonraker_stats": [],
         "throttled_state": None,
@@ -240,7 +241,7 @@ def proc_stats() -> dict[str, Any]:
         "network": {},
         "system_cpu_usage": {"cpu": round(min(os.getloadavg()[0] / (os.cpu_count() or 1), 1.0) * 100.0, 1)},
         "system_memory": {"total": 0, "available": 0, "used": 0},
-        "system_uptime": times.elapsed,
+        "system_uptime": time.clock_gettime(time.CLOCK_BOOTTIME),
         "websocket_connections": 0,
     }
 
@@ -248,21 +249,6 @@ def proc_stats() -> dict[str, Any]:
 def _status(error: JobError) -> int:
     """HTTP's word for a refusal."""
     return {"missing": 404, "size": 413, "full": 507, "state": 409}.get(error.problems[0].kind, 400)
-
-
-def _wanted(params: Params) -> dict[str, list[str] | None]:
-    """``{"objects": {"toolhead": ["position"], "print_stats": null}}``."""
-    found = params["objects"]
-    if not isinstance(found, dict) or len(found) > 200:
-        raise TypeError("objects")
-    return {str(name): None if keys is None else [str(key) for key in keys] for name, keys in found.items()}
-
-
-def _text(params: Params, name: str) -> str:
-    value = params[name]
-    if not isinstance(value, str):
-        raise TypeError(name)
-    return value
 
 
 def _listed(entry: Entry) -> dict[str, Any]:
