@@ -38,8 +38,8 @@ NEIGHBOURS = 3
 MICRON = 1e-3
 """mm: less is rounding, of coordinates and of chords that stand for curves"""
 HEAD = (
-    "| file | rows | v of F | v | a | j | slider v | slider a | slider j | force window | off the path mm (of) "
-    "| places missed |"
+    "| file | rows | v of F | v | a | j | slider v | slider a | slider j | force window "
+    "| off the path mm (of) | places missed |"
 )
 
 
@@ -120,14 +120,11 @@ class Worst:
         """Look at a chunk."""
         shares = [self._fed(rows)]
         for part, limits in (("nozzle", "limits"), ("slider", "sliders")):
-            for order, what, unit in (
-                (1, "speed", "mm_s"),
-                (2, "acceleration", "mm_s2"),
-                (3, "jerk", "mm_s3"),
-            ):
+            names = ("speed_max_mm_s", "acceleration_max_mm_s2", "jerk_max_mm_s3")
+            for order, what in enumerate(names, 1):
                 change = np.diff(rows[part], order, axis=0) * RATE_HZ**order
                 size = np.linalg.norm(change, axis=1) if part == "nozzle" else np.abs(change)
-                shares.append(size.max(initial=0.0) / self._profile[limits][f"{what}_max_{unit}"])
+                shares.append(size.max(initial=0.0) / self._profile[limits][what])
         self.shares = np.maximum(self.shares, [*shares, self._loaded(rows["tension"])])
         self._near(rows)
 
@@ -207,8 +204,8 @@ def row(program: Path, name: str, folder: Path) -> tuple[str, bool]:
 
 def programs(options: argparse.Namespace, folder: Path) -> Iterator[Path]:
     """Those to look at."""
-    files = options.files or sorted((ROOT / "gcode").glob("*.gcode*"))
-    yield from files[:1] if options.smoke else files
+    pattern = "paper_ring_double.gcode" if options.smoke else "*.gcode*"
+    yield from options.files or sorted((ROOT / "gcode").glob(pattern))
     for name, points in list(stress().items())[: 1 if options.smoke else None]:
         yield written(folder, name, points)
 
