@@ -68,6 +68,8 @@ class Lines:
         if stream is None:
             return False
         stream.go_on()
+        if self._player.aside is not None:
+            return False
         standing = not self._player.busy or (stop is not None and stop.waits)
         if standing:
             self._happened(Word.UP, "")
@@ -82,7 +84,7 @@ class Lines:
     def turn(self, state: JobState) -> None:
         """Read lines, and begin to play once there is something."""
         stream, player = self._stream, self._player
-        if stream is None:
+        if stream is None or player.aside is not None:
             return
         course, place = stream.course, player.feeder.place() if player.busy else None
         if state in MOVES:

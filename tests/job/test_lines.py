@@ -100,6 +100,46 @@ def test_a_long_even_bead_has_no_stop_in_it() -> None:
     assert speed[moving[0] + 600 : moving[-1] - 400].min() > 0.01
 
 
+def test_a_pause_before_which_all_was_sent_is_resumed_and_held_again() -> None:
+    bench = Bench()
+    bench.send("G1 X10 F1800", "M0 more clay")
+    for _ in range(2):
+        bench.until(lambda: bench.state is JobState.HELD)
+        bench.printer.resume()
+        bench.until(lambda: bench.state is JobState.PRINTING)
+        bench.turns(20)
+        bench.printer.hold()
+    bench.until(lambda: bench.state is JobState.HELD)
+    bench.printer.resume()
+    bench.send("G1 X20")
+    bench.feed.finish()
+    bench.until(lambda: bench.state is JobState.DONE)
+    assert bench.nozzle()[-1] == pytest.approx([0.02, 0.0, 0.0], abs=1e-6)
+
+
+@pytest.mark.parametrize("pauses", [True, False])
+def test_a_held_stream_goes_on_where_it_stood_after_a_jog(pauses: bool) -> None:
+    bench = Bench()
+    bench.send("G1 X10 F1800", *(["M0 more clay"] if pauses else []), "G1 X20")
+    if not pauses:
+        bench.until(lambda: bool(bench.rows) and bench.nozzle()[-1, 0] > 0.003)
+        bench.printer.hold()
+    bench.until(lambda: bench.state is JobState.HELD)
+    stood = bench.nozzle()[-1]
+    jog = bench.printer.run("G91\nG1 Z15 F1800\nG1 Y5")
+    bench.until(jog.done)
+    assert jog.result().ok
+    before = sum(map(len, bench.rows))
+    bench.printer.resume()
+    bench.feed.finish()
+    bench.until(lambda: bench.state is JobState.DONE)
+    after = bench.nozzle()[before:]
+    assert after[-1] == pytest.approx([0.02, 0.0, 0.0], abs=1e-6)
+    assert np.abs(np.diff(after, axis=0)).max() < 0.1 * PROFILE.drives.period + 1e-9
+    down = after[np.argmax(after[:, 2] < 1e-6)]
+    assert down == pytest.approx(stood, abs=1e-5)
+
+
 def test_a_slow_bead_has_no_stop_in_it_and_ends_soon_after_its_client_has() -> None:
     bench = Bench()
     turns = np.arange(1, 110) / 40.0
