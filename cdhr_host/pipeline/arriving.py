@@ -85,9 +85,9 @@ class Arriving(Course):
             self.stops.append(Stop(self.staircase.tick, None, waits=True))
             self._rests = True
 
-    def passed(self) -> None:
-        """Go on beyond the stop that comes next; where nothing is planned there yet, it stands and waits."""
-        super().passed()
+    def leave(self) -> None:
+        """Go on beyond the stop at which it stands; where nothing is planned there yet, wait there."""
+        self.passed()
         if self.rests and not self.stops:
             self.stops.append(Stop(self.staircase.tick, None, waits=True))
 
