@@ -112,7 +112,7 @@ class Worst:
         self._profile, self._drawing = profile, drawing
         self.shares = np.zeros(8)
         self.away = self.beyond = 0.0
-        self.tolerance = profile["path"]["tolerance_mm"]
+        self.tolerance = float(drawing.tolerance.max())
         self._missing = np.full((len(drawing.line), 5), np.inf)
         self._places = np.array([drawing.places(move) for move in range(len(drawing.line))])
 
@@ -156,7 +156,8 @@ class Worst:
             near = np.clip(move + step, 0, len(drawing.line) - 1)
             away = np.minimum(away, drawing.distance(near, rows["nozzle"]))
             self._cover(near, rows["nozzle"])
-        free = np.isin(rows["line"], drawing.free_lines) | (rows["line"] < drawing.line[0])
+        # What lines do that draw nothing, as a pause that lifts, is the machine's own.
+        free = np.isin(rows["line"], drawing.free_lines) | ~np.isin(rows["line"], drawing.line)
         away[free] = 0.0
         around = [drawing.tolerance[np.clip(move + step, 0, len(drawing.line) - 1)] for step in steps]
         over = away - np.max(around, axis=0)
