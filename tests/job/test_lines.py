@@ -8,10 +8,11 @@ import pytest
 from stepped import Stepped
 
 from cdhr_host.drives import Loopback
-from cdhr_host.errors import JobError
+from cdhr_host.errors import JobError, MotionError, Problem
 from cdhr_host.job.printer import Printer
 from cdhr_host.job.surface import Event, JobState
 from cdhr_host.pipeline import Staircase, open_profile
+from cdhr_host.pipeline.arriving import Arriving
 from cdhr_host.values import Feedback, Setpoints
 
 PROFILE = open_profile("paper")
@@ -138,6 +139,35 @@ def test_a_held_stream_goes_on_where_it_stood_after_a_jog(pauses: bool) -> None:
     assert np.abs(np.diff(after, axis=0)).max() < 0.1 * PROFILE.drives.period + 1e-9
     down = after[np.argmax(after[:, 2] < 1e-6)]
     assert down == pytest.approx(stood, abs=1e-5)
+
+
+@pytest.mark.parametrize("moving", [True, False])
+def test_a_line_found_impossible_late_is_named_with_what_to_do(
+    monkeypatch: pytest.MonkeyPatch, moving: bool
+) -> None:
+    bench = Bench()
+    bench.send("G1 X10 F600")
+    bench.until(lambda: bool(bench.rows) or not moving)
+    problem = Problem("force", "cable 3 would carry 0.3 N, less than 0.5 N", 2, value=0.3, limit=0.5)
+    told = [problem]
+
+    def rows(first: int, last: int) -> Setpoints:
+        if told and first == bench.feed._seen:
+            raise MotionError([told.pop()])
+        return Arriving.rows(bench.feed.course, first, last)
+
+    monkeypatch.setattr(bench.feed.course, "rows", rows)
+    bench.send("G1 X20")
+    bench.until(lambda: bench.state is JobState.HELD)
+    assert bench.printer.status().message.startswith("line 2 cannot be moved: cable 3 would carry 0.3 N")
+    (event,) = [event for event in bench.events if event.problem is not None]
+    assert event.problem.line == 2
+    assert (event.problem.value, event.problem.limit) == (0.3, 0.5)
+    assert "cancel it, then send that line slower" in str(event.problem.hint)
+    with pytest.raises(JobError, match="cannot be moved"):
+        bench.printer.resume()
+    bench.printer.abort()
+    bench.until(lambda: bench.state is JobState.STOPPED)
 
 
 def test_a_slow_bead_has_no_stop_in_it_and_ends_soon_after_its_client_has() -> None:

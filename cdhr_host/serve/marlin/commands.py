@@ -124,7 +124,8 @@ class Commands:
             try:
                 return OK if self._bench.offer(line, typed=typed) else None
             except JobError as error:
-                return [f"echo:{problem_text(error.problems[0])}", *OK]
+                still_moves = error.problems[0].kind == "busy"
+                return None if still_moves else [f"echo:{problem_text(error.problems[0])}", *OK]
 
         return taken() or taken
 
