@@ -9,7 +9,7 @@ import typer
 
 from cdhr_host.cli.machine import open_machine
 from cdhr_host.cli.options import Json, MaterialName, ProfileName, examples
-from cdhr_host.cli.refusals import Refusal, about, check_file, emit, say, writing
+from cdhr_host.cli.refusals import Refusal, about, check_file, check_picture, emit, say, writing
 
 if TYPE_CHECKING:
     from cdhr_host.cli.measurements import Table
@@ -75,8 +75,7 @@ def clay(
         write_pattern(pattern, machine, by, pressures, options)
         return
     target = _target(write, force)
-    if plot is not None:
-        check_file(plot, [".png", ".svg", ".pdf"], "--plot")
+    check_picture(plot, "--plot")
     names = ", ".join(str(path) for path in tables or ())
     found = _fitted(machine, tables or [], density)
     if plot is not None:
@@ -182,12 +181,8 @@ def _draw(found: "ClayFit", names: str, plot: Path) -> None:
     from cdhr_host.report.clay_fit import draw
     from cdhr_host.report.files import put
 
-    try:
-        with writing(plot), put(plot) as part:
-            draw(found, names, part)
-    except ImportError:
-        hint = "hint: pip install 'cdhr-host[plot]', or leave out --plot"
-        raise Refusal(f"cdhr: error: --plot needs matplotlib\n{hint}") from None
+    with writing(plot), put(plot) as part:
+        draw(found, names, part)
 
 
 def _tell(found: "ClayFit", names: str, target: Path | None, json_: bool) -> None:

@@ -10,7 +10,7 @@ import typer
 
 from cdhr_host.cli.machine import open_machine
 from cdhr_host.cli.options import Json, ProfileName, examples
-from cdhr_host.cli.refusals import Refusal, about, check_file, emit, say, writing
+from cdhr_host.cli.refusals import Refusal, about, check_file, check_picture, emit, say, writing
 from cdhr_host.units import MM
 
 if TYPE_CHECKING:
@@ -178,12 +178,9 @@ def _doubts(pulley: float, attachment: float, offset: float, radius: float) -> "
 
 def _check(plot: Path | None, write: Path | None, noise: float | None) -> None:
     """Refuse what could not be done in the end, before any work."""
-    from cdhr_host.report.files import PICTURES
-
     if noise is not None and noise <= 0.0:
         raise Refusal(f"cdhr: error: --noise {noise:g} must be above 0\nhint: leave it out to measure it")
-    if plot is not None:
-        check_file(plot, PICTURES, "--plot")
+    check_picture(plot, "--plot")
     if write is not None:
         check_file(write, [".toml"], "--write")
         _keep_old(write)
@@ -227,12 +224,8 @@ def _draw(fit: "GeometryFit", title: str, plot: Path) -> None:
     from cdhr_host.report.files import put
     from cdhr_host.report.studies.picture import draw
 
-    try:
-        with writing(plot), put(plot) as part:
-            draw(fit, title, part)
-    except ImportError:
-        hint = "hint: pip install 'cdhr-host[plot]', or leave out --plot"
-        raise Refusal(f"cdhr: error: --plot needs matplotlib\n{hint}") from None
+    with writing(plot), put(plot) as part:
+        draw(fit, title, part)
 
 
 def _tell(fit: "GeometryFit", table: Path) -> None:

@@ -10,7 +10,7 @@ import typer
 from cdhr_host.cli.machine import open_machine
 from cdhr_host.cli.options import Json, examples
 from cdhr_host.cli.progress import Progress, clock_text
-from cdhr_host.cli.refusals import Refusal, check_file, emit, say, writing
+from cdhr_host.cli.refusals import Refusal, check_picture, emit, say, writing
 
 if TYPE_CHECKING:
     from cdhr_host.profile import Profile
@@ -24,7 +24,7 @@ EXAMPLES = examples(
     "cdhr plot run.parquet --what path --colour tension --lines 100:400",
     "cdhr plot run.parquet --out run.pdf",
 )
-NEED = "cdhr: error: pictures need matplotlib\nhint: python3 -m pip install 'cdhr-host[plot]'"
+LOGS = "hint: logs are written by cdhr dry-run FILE --log LOG and cdhr stream FILE --log LOG"
 
 
 class What(StrEnum):
@@ -76,14 +76,11 @@ def plot(
     json_: Json = False,
 ) -> None:
     """Draw a log: path, slider motion, cable forces in their windows, clay and air, following error."""
-    from cdhr_host.report.files import PICTURES
-    from cdhr_host.report.plot.write import available, shown_in, write_pictures
+    from cdhr_host.report.plot.write import shown_in, write_pictures
     from cdhr_host.report.reading import LogFileError
 
-    if not available():
-        raise Refusal(NEED)
     out = Path(f"{log.stem}.png") if out is None else out
-    check_file(out, PICTURES, "--out")
+    check_picture(out, "--out")
     choice = _choice(begin, end, lines)
     try:
         found = _drawn(log, profile, choice)
@@ -101,12 +98,9 @@ def plot(
 def _drawn(path: Path, profile: str | None, choice: "Choice") -> "Drawn":
     """Pass through the log; raises Refusal, LogFileError."""
     from cdhr_host.report.plot.passing import drawn
-    from cdhr_host.report.reading import LogFile
 
-    if not path.is_file():
-        raise Refusal(f"{path}: error: {'not a file' if path.exists() else 'there is no such file'}")
     try:
-        log = LogFile.opened(path)
+        log = _opened(path)
         machine = open_machine(profile) if profile is not None else log.profile
         _doubt(log, machine)
         with Progress("reading") as progress:
@@ -118,6 +112,19 @@ def _drawn(path: Path, profile: str | None, choice: "Choice") -> "Drawn":
             return drawn(log, machine, choice, told)
     except OSError as error:
         raise Refusal(f"{path}: error: cannot read: {error.strerror or error}") from error
+
+
+def _opened(path: Path) -> "LogFile":
+    """Raises Refusal for what is no log, OSError where it cannot be read."""
+    from cdhr_host.report.reading import LogFile, LogFileError
+
+    if not path.is_file():
+        found = "not a file" if path.exists() else "there is no such file"
+        raise Refusal(f"{path}: error: {found}\n{LOGS}")
+    try:
+        return LogFile.opened(path)
+    except LogFileError as error:
+        raise Refusal(f"{path}: error: {error}\n{LOGS}") from error
 
 
 def _doubt(log: "LogFile", machine: "Profile | None") -> None:

@@ -12,6 +12,7 @@ from typer.core import TyperGroup
 
 from cdhr_host.errors import CdhrError, Problem
 
+ROOM = "make room or mend it, or name a file elsewhere; what was there before is untouched"
 USAGE = 2
 INTERRUPTED = 130
 
@@ -57,7 +58,8 @@ def writing(path: Path, consequence: str = "") -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise Refusal(f"cdhr: error: cannot write {path}: {error.strerror}{consequence}") from error
+        said = f"cdhr: error: cannot write {path}: {error.strerror or error}{consequence}"
+        raise Refusal(f"{said}\nhint: {ROOM}") from error
 
 
 def check_file(path: Path, suffixes: Collection[str], option: str) -> None:
@@ -68,6 +70,18 @@ def check_file(path: Path, suffixes: Collection[str], option: str) -> None:
         check_place(path, suffixes)
     except TargetError as error:
         raise Refusal(f"cdhr: error: {option} {path}: {error}") from error
+
+
+def check_picture(path: Path | None, option: str) -> None:
+    """Refuse a picture that could not be drawn, before any work; nothing where none is wanted."""
+    from cdhr_host.report.files import PICTURES
+    from cdhr_host.report.plot.write import available
+
+    if path is None:
+        return
+    if not available():
+        raise Refusal("cdhr: error: pictures need matplotlib\nhint: python3 -m pip install 'cdhr-host[plot]'")
+    check_file(path, PICTURES, option)
 
 
 def say(text: str) -> None:

@@ -10,7 +10,7 @@ import typer
 from cdhr_host.cli.machine import open_machine
 from cdhr_host.cli.options import Json, ProfileName, examples
 from cdhr_host.cli.progress import Progress
-from cdhr_host.cli.refusals import Refusal, about, check_file, emit, writing
+from cdhr_host.cli.refusals import Refusal, about, check_file, check_picture, emit, writing
 from cdhr_host.units import MM
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def calibration(  # noqa: PLR0917 -- options
     json_: Json = False,
 ) -> None:
     """Calibrate many simulated machines: is the truth within its doubts, and what is gained."""
-    _check(plot)
+    check_picture(plot, "--plot")
     machine = open_machine(profile)
     with about(profile):
         from cdhr_host.report.studies.summary import calibration_jobs, calibration_study
@@ -77,7 +77,7 @@ def tolerance(  # noqa: PLR0917 -- options
     """How far the nozzle strays for pulleys, attachments, offsets and radii that are off by so much."""
     from cdhr_host.samples import LAWS
 
-    _check(plot)
+    check_picture(plot, "--plot")
     if trajectory not in LAWS:
         raise Refusal(f"cdhr: error: no trajectory {trajectory}\nhint: there are {', '.join(LAWS)}")
     machine = open_machine(profile)
@@ -102,7 +102,7 @@ def workspace(  # noqa: PLR0917 -- options
     json_: Json = False,
 ) -> None:
     """Force margins over the whole bed, node by node, without taking the machine for symmetric."""
-    _check(plot)
+    check_picture(plot, "--plot")
     if write is not None:
         check_file(write, [".csv"], "--write")
     machine = open_machine(profile)
@@ -138,23 +138,12 @@ def _shown(found: Iterable[R], count: int, progress: Progress) -> Iterable[R]:
         yield each
 
 
-def _check(plot: Path | None) -> None:
-    if plot is not None:
-        from cdhr_host.report.files import PICTURES
-
-        check_file(plot, PICTURES, "--plot")
-
-
 def _finish(found: "Study", title: str, plot: Path | None, json_: bool) -> None:
     if plot is not None:
         from cdhr_host.report.files import put
 
-        try:
-            with writing(plot), put(plot) as part:
-                found.draw(title, part)
-        except ImportError:
-            hint = "hint: pip install 'cdhr-host[plot]', or leave out --plot"
-            raise Refusal(f"cdhr: error: --plot needs matplotlib\n{hint}") from None
+        with writing(plot), put(plot) as part:
+            found.draw(title, part)
     if json_:
         record: dict[str, Any] = {"title": title, **found.record()}
         emit(json.dumps(record))

@@ -9,7 +9,7 @@ import typer
 from cdhr_host.cli.machine import open_machine
 from cdhr_host.cli.options import Json, ProfileName, examples
 from cdhr_host.cli.progress import Progress
-from cdhr_host.cli.refusals import Refusal, about, check_file, emit, writing
+from cdhr_host.cli.refusals import Refusal, about, check_picture, emit, writing
 from cdhr_host.cli.source import Source
 from cdhr_host.units import MM
 
@@ -71,16 +71,8 @@ Mapped = tuple["MarginMap", "Workspace", "Sited | None"]
 
 def _check(figure: Path | None, map_: Path | None) -> None:
     """Refuse pictures that could not be drawn, before any work."""
-    from cdhr_host.report.files import PICTURES
-    from cdhr_host.report.plot.write import available
-
-    for path, option in ((figure, "--figure"), (map_, "--map")):
-        if path is not None:
-            check_file(path, PICTURES, option)
-            if not available():
-                raise Refusal(
-                    "cdhr: error: pictures need matplotlib\nhint: python3 -m pip install 'cdhr-host[plot]'"
-                )
+    check_picture(figure, "--figure")
+    check_picture(map_, "--map")
 
 
 def _part(source: Source, space: "Workspace", chart: "MarginMap", acceleration: float) -> "Sited":

@@ -39,7 +39,10 @@ def open_link(url: str, profile: Profile, clock: Clock) -> MachineLink:
 
 
 def make_link(url: str, profile: Profile, clock: Clock) -> MachineLink:
-    """The link a drives URL names, still closed. DriveError when there is no such link."""
+    """The link a drives URL names, still closed.
+
+    DriveError when there is no such link, ProfileError when the bus would be too full.
+    """
     scheme, colon, rest = url.partition(":")
     if not colon or not (scheme in _FORMS or _interface(scheme)):
         raise _unknown(url, scheme)
@@ -54,13 +57,13 @@ def _wired(url: str, scheme: str, profile: Profile) -> MachineLink:
     """A link to drives outside this process; their libraries are imported only here."""
     from cdhr_host.drives.address import split_rate  # noqa: PLC0415
     from cdhr_host.drives.bridge.pumped import PumpedBridge  # noqa: PLC0415
+    from cdhr_host.drives.canopen.load import BIT_RATE, bus_share  # noqa: PLC0415
     from cdhr_host.drives.reference import default_store  # noqa: PLC0415
     from cdhr_host.drives.sender import SenderLink  # noqa: PLC0415
 
     if scheme == "link":
         return PumpedBridge(profile, *split_rate(url, "BAUD", 921_600))
-    if scheme == "slcan":
-        split_rate(url, "BITRATE", 1_000_000)
+    bus_share(profile, split_rate(url, "BITRATE", BIT_RATE)[1] if scheme == "slcan" else BIT_RATE)
     return SenderLink(url, profile, default_store())
 
 

@@ -81,7 +81,7 @@ class Changes:
         part = score.last
         if feeder.stop is not None:
             pace = Pace((steady(begin, feeder.stop.tick - 1.0, rate),))
-            part.course.passed()
+            part.course.leave()
             feeder.making.go_on(score.with_part(Part(feeder.next_tick, part.course, pace)))
             return
         score = replace(score, prime=self._prime(score, begin, prime))

@@ -43,6 +43,10 @@ SENDING: Final = 0.3
 """the same once a client has sent more than WAITING_FULL lines: it has more, but was kept from sending"""
 
 
+BLOCKED: Final = "this print cannot go on: cancel it, then send that line slower or elsewhere"
+"""said of a line that proves impossible only together with its neighbours"""
+
+
 @dataclass(frozen=True, slots=True)
 class Waiting:
     """A line not read yet."""
@@ -179,7 +183,7 @@ class LineStream:
         except MotionError as error:
             self.blocked = True
             self.refusal = error.problems[0]
-            self._tell(replace(self.refusal, hint="this print cannot go on: cancel it"))
+            self._tell(replace(self.refusal, hint=BLOCKED))
             return False
         self._seen = end
         return True

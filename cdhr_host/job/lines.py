@@ -7,7 +7,7 @@ from typing import Final
 from cdhr_host.drives.clock import Clock
 from cdhr_host.drives.link import LinkState
 from cdhr_host.errors import JobError, Problem
-from cdhr_host.job.line_stream import LineStream
+from cdhr_host.job.line_stream import BLOCKED, LineStream
 from cdhr_host.job.player import Player
 from cdhr_host.job.states import Word
 from cdhr_host.job.surface import JobState, Progress
@@ -60,7 +60,7 @@ class Lines:
     def check_resume(self) -> None:
         """Raises JobError where what is planned cannot be moved."""
         if self._stream is not None and self._stream.blocked:
-            raise JobError(Problem("state", "this print cannot go on", hint="cancel it"))
+            raise JobError(Problem("state", "a line of this print cannot be moved", hint=BLOCKED))
 
     def resumed(self) -> bool:
         """Go on from a refused line; whether that is all, because nothing waits to be played."""
@@ -68,6 +68,8 @@ class Lines:
         if stream is None:
             return False
         stream.go_on()
+        if self._player.aside is not None:
+            return False
         standing = not self._player.busy or (stop is not None and stop.waits)
         if standing:
             self._happened(Word.UP, "")
@@ -82,7 +84,7 @@ class Lines:
     def turn(self, state: JobState) -> None:
         """Read lines, and begin to play once there is something."""
         stream, player = self._stream, self._player
-        if stream is None:
+        if stream is None or player.aside is not None:
             return
         course, place = stream.course, player.feeder.place() if player.busy else None
         if state in MOVES:
@@ -134,9 +136,12 @@ class Lines:
 
     def _blocked(self, stream: LineStream) -> None:
         if stream.refusal is not None:
-            message, stream.refusal = stream.refusal.message, None
-            self._happened(Word.HOLD, message)
+            refusal, stream.refusal = stream.refusal, None
+            why = f"line {refusal.line} cannot be moved: {refusal.message}; cancel the print"
+            self._happened(Word.HOLD, why)
             self._player.hold()
+            if not self._player.busy:
+                self._happened(Word.RESTED, why)
 
     def _all_executed(self, stream: LineStream) -> bool:
         """Whether the machine stands after all that is planned."""

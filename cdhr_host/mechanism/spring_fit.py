@@ -31,8 +31,8 @@ AZIMUTHS: Final = np.linspace(0.0, 60.0, 5) * DEG
 HEIGHTS: Final = 26
 NEAR: Final = 0.06
 """a margin this far below zero counts as beyond what is possible"""
-PIECE: Final = 6
-"""poses of a product done at once"""
+PIECE: Final = 24
+"""rows of a product done at once"""
 DAMPINGS: Final = 8
 """tries of a Newton step, each damped six times as much"""
 
@@ -43,15 +43,18 @@ class _Fit:
 
     response: Response
     windows: Windows
-    basis: Array
-    """(N, 3, M)"""
+    level: Array
+    """(N, 2, L): how the first coefficients turn into s_x and s_y; the others do not"""
+    upright: Array
+    """(N, 1, M - L): how the others turn into s_z; the first do not"""
     weight: Array
     """(N,) what each pose counts"""
     damping: float = 1e-3
 
     def spring(self, coefficients: Array) -> Array:
         """(M,) -> (N, 3) N."""
-        return np.asarray(self.basis @ coefficients, dtype=np.float64)
+        aside = self.level.shape[2]
+        return np.hstack((self.level @ coefficients[:aside], self.upright @ coefficients[aside:]))
 
     def worst(self, coefficients: Array, sharpness: float) -> tuple[float, Array, Array]:
         """The sum, and each pose's slope (N, 3) and curvature (N, 3, 3) by its spring force."""
@@ -71,9 +74,8 @@ class _Fit:
     def step(self, coefficients: Array, sharpness: float) -> Array:
         """One damped Newton step; the same coefficients where none gets better."""
         value, slope, curve = self.worst(coefficients, sharpness)
-        gradient = np.einsum("nkm,nk->m", self.basis, self.weight[:, None] * slope)
-        curve += 1e-7 * np.eye(3)
-        hessian = _product(self.weight[:, None, None] * (curve @ self.basis), self.basis)
+        gradient = self._gathered(self.weight[:, None] * slope)
+        hessian = self._hessian(self.weight[:, None, None] * (curve + 1e-7 * np.eye(3)))
         scale = float(np.diag(hessian).mean()) * np.eye(len(coefficients))
         for _ in range(DAMPINGS):
             trial = coefficients - _solved(hessian + self.damping * scale, gradient)
@@ -82,6 +84,19 @@ class _Fit:
                 return trial
             self.damping *= 6.0
         return coefficients
+
+    def _gathered(self, slope: Array) -> Array:
+        """(N, 3) by the spring force -> (M,) by the coefficients."""
+        aside, up = np.tensordot(slope[:, :2], self.level), np.tensordot(slope[:, 2:], self.upright)
+        return np.concatenate((aside, up))
+
+    def _hessian(self, curve: Array) -> Array:
+        """(N, 3, 3) by the spring force -> (M, M) by the coefficients."""
+        level, upright = self.level, self.upright
+        corner = _product(curve[:, :2, :2] @ level, level)
+        beside = _product(curve[:, 2:, :2] @ level, upright)
+        last = _product(curve[:, 2:, 2:] * upright, upright)
+        return np.block([[corner, beside], [beside.T, last]])
 
 
 def best_field(cables: Cables, loads: Loads, pairs: Pairs, windows: Windows, rows: Flags) -> SpringField:
@@ -97,7 +112,9 @@ def best_field(cables: Cables, loads: Loads, pairs: Pairs, windows: Windows, row
     coefficients = full[used]
     matrix = basis(domain, (places[:, 0], places[:, 1], places[:, 2]))[:, :, used]
     start = matrix @ coefficients
-    fit = _Fit(_answer(cables, loads, pairs, places, start), windows, matrix, np.ones(len(places)))
+    aside = int(rows[: SPLITS[1]].sum()) * (RISE + 1)
+    level, upright = (np.ascontiguousarray(part) for part in (matrix[:, :2, :aside], matrix[:, 2:, aside:]))
+    fit = _Fit(_answer(cables, loads, pairs, places, start), windows, level, upright, np.ones(len(places)))
     for sharpness, steps in ROUNDS:
         for _ in range(steps):
             coefficients = fit.step(coefficients, sharpness)
@@ -109,15 +126,21 @@ def best_field(cables: Cables, loads: Loads, pairs: Pairs, windows: Windows, row
 
 
 def _product(left: Array, right: Array) -> Array:
-    """(N, 3, M) twice -> (M, M): the sum of leftᵀ right, in pieces small enough to stay on one core.
+    """(N, K, L), (N, K, M) -> (L, M): the sum of leftᵀ right, in pieces small enough to stay on one core.
 
     A library that spreads the product over all cores is slower wherever these have other work.
     """
-    size = left.shape[2]
-    pieces = np.zeros((2, -(-left.shape[0] // PIECE) * PIECE, 3, size))
-    pieces[0, : len(left)], pieces[1, : len(left)] = left, right
-    first, second = pieces.reshape(2, -1, 3 * PIECE, size)
+    count = left.shape[0] * left.shape[1]
+    first, second = (_pieces(rows.reshape(count, rows.shape[2])) for rows in (left, right))
     return np.asarray((first.transpose(0, 2, 1) @ second).sum(axis=0), dtype=np.float64)
+
+
+def _pieces(rows: Array) -> Array:
+    """(N, M) -> (P, PIECE, M), filled up with zeros."""
+    count, width = -(-len(rows) // PIECE), rows.shape[1]
+    filled = np.zeros((count * PIECE, width))
+    filled[: len(rows)] = rows
+    return filled.reshape(count, PIECE, width)
 
 
 def _solved(matrix: Array, vector: Array) -> Array:

@@ -85,6 +85,12 @@ class Arriving(Course):
             self.stops.append(Stop(self.staircase.tick, None, waits=True))
             self._rests = True
 
+    def leave(self) -> None:
+        """Go on beyond the stop at which it stands; where nothing is planned there yet, wait there."""
+        self.passed()
+        if self.rests and not self.stops:
+            self.stops.append(Stop(self.staircase.tick, None, waits=True))
+
     def _draw(self) -> None:
         while (command := self._arrived.at(self._at)) is not None:
             if not self._opened:

@@ -191,6 +191,10 @@ class Course:
         """Go on beyond the stop that comes next."""
         self.stops.popleft()
 
+    def leave(self) -> None:
+        """Go on beyond the stop at which it stands."""
+        self.passed()
+
     def hastened(self, u: float, override: FeedOverride) -> "Course":
         """The same text from the last border before a time of the plan on, planned with another feed."""
         cause = self.placed_at(u).cause

@@ -157,7 +157,7 @@ class Host:
         if status.state is not JobState.READY:
             problems = tuple(self._problems) or (Problem("program", status.message or f"{name} is refused"),)
             raise JobError(problems)
-        if not status.homed:
+        if not (status.homed and status.referenced):
             self.say("echo: going to the reference pose first")
             await self.run("G28")
         self.surface.start()

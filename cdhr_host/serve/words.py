@@ -12,7 +12,7 @@ from cdhr_host.program.straight import Row
 from cdhr_host.program.words import WORDS
 from cdhr_host.units import INCH, MINUTE, MM
 
-_CODE: Final = re.compile(r"\s*([GMTgmt])\s*([0-9]+(?:\.[0-9]+)?)(?![A-Za-z_0-9])")
+_CODE: Final = re.compile(r"\s*([GMTgmt])\s*([0-9]+(?:\.[0-9]+)?)(?![_0-9]|[A-Za-z](?![-+.0-9]))")
 _SCRIPT: Final = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*)")
 
 

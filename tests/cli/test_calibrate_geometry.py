@@ -140,6 +140,31 @@ def test_refusals(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    "words", [("calibrate", "study"), ("study", "tolerance"), ("calibrate", "geometry", "a.csv")]
+)
+def test_a_picture_that_cannot_be_drawn_is_refused_before_the_work(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], words: tuple[str, ...]
+) -> None:
+    monkeypatch.setattr("cdhr_host.report.plot.write.find_spec", lambda _: None)
+    monkeypatch.setattr("cdhr_host.cli.study.open_machine", lambda _: pytest.fail("work was begun"))
+    ended, text = refusal(capsys, *words, "--plot", "a.png")
+    assert ended == 2
+    assert "pip install 'cdhr-host[plot]'" in text
+
+
+def test_a_pretended_machine_is_found_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    tables = [tmp_path / name for name in ("one.csv", "same.csv", "other.csv")]
+    for table, seed in zip(tables, ("4", "4", "5"), strict=True):
+        run("calibrate", "plan", str(table), "--count", "12", "--pretend", seed)
+    one, same, other = (table.read_text(encoding="utf-8") for table in tables)
+    assert one == same != other
+    capsys.readouterr()
+    run("calibrate", "geometry", str(tables[0]), "--json")
+    held_out = json.loads(capsys.readouterr().out)["held_out"]
+    assert held_out["rms_after_mm"] < 0.2 * held_out["rms_before_mm"]
+
+
 def test_points_of_another_frame_are_doubted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table = measured(tmp_path, 6)
     rows = [line.split(",") for line in table.read_text(encoding="utf-8").splitlines()]

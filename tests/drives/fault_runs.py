@@ -11,6 +11,7 @@ import numpy as np
 from bench import Bench
 from bridge_cases import BRIDGE_CASES, run_bridge
 from fault_cases import CASES, ROWS, SPOILT_AFTER, WALL, ZERO
+from odd_cases import ODD, tolerate
 from refusal_cases import BAD_ROWS, REFUSALS, refuse, reject
 from trajectories import PERIOD
 
@@ -140,6 +141,12 @@ def refusals():
         yield "22 H", case.fault, "a row fed", "refused before the wire", reject(case)
 
 
+def tolerated():
+    """Odd nodes that are armed all the same."""
+    for case in ODD:
+        yield case.row, case.fault, case.injected, tolerate(case)
+
+
 STOP = "path-true stop, air off, fault"
 WATCHED = (
     ("a cable slack, by its force sensor", "slack_force_n", "force_settling_ms", "slack", STOP),
@@ -183,9 +190,9 @@ off, and arming is refused until the drives have been closed and opened by the o
 {refusals}
 ## Tolerated
 
-Drives that start OPERATIONAL by themselves, boot after 4 s or send an EMCY at boot (16), lack 0x1019, or
-take it and answer the counter with EMCY 0x8240 (18): noted, and tested (`tests/drives/test_faults.py`).
+Armed all the same, and noted; where one node refuses it, SYNC has no counter for anybody.
 
+{tolerated}
 ## What the host watches
 
 It knows the plan, so it sees what drives cannot. Thresholds are in `[watch]`; each is a test
@@ -205,6 +212,7 @@ if __name__ == "__main__":
         moving=table(HEADS, moving()),
         bridged=table(HEADS, bridged()),
         watched=table(["fault", "threshold", "lasting", "problem", "reaction"], WATCHED),
+        tolerated=table(["#", "oddity", "injected how", "noted"], tolerated()),
         refusals=table(["#", "fault", "injected how", "reaction", "said"], refusals()),
     )
     target.write_text(text, encoding="utf-8")

@@ -1,6 +1,5 @@
 """The fault list: every row injected, the reaction demanded."""
 
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +8,7 @@ from bench import Bench
 from bridge_cases import BRIDGE_CASES, run_bridge
 from fault_cases import CASES
 from fault_runs import run
+from odd_cases import ODD, tolerate
 from refusal_cases import BAD_ROWS, REFUSALS, refuse, reject
 from trajectories import PAPER, run_of
 
@@ -47,8 +47,8 @@ def test_page_has_every_row_of_the_fault_list():
     page = (Path(__file__).resolve().parents[2] / "docs" / "faults.md").read_text(encoding="utf-8")
     shown = {line.split("|")[1].strip() for line in page.splitlines() if line.startswith("| ")}
     numbers = {int(row.split()[0]) for row in shown if row[:1].isdigit()}
-    assert numbers | {16} == set(range(1, 27))
-    for case in (*CASES, *BRIDGE_CASES, *REFUSALS):
+    assert numbers == set(range(1, 27))
+    for case in (*CASES, *BRIDGE_CASES, *REFUSALS, *ODD):
         assert f"| {case.row} | {case.fault} | {case.injected} |" in page
 
 
@@ -109,54 +109,14 @@ def test_13_read_back_that_differs(key):
     refused(bench, rf"drive 6: 0x{key[0]:04X}:{key[1]:02X} .* reads back 5, written was")
 
 
-def _spoilt(name, value):
-    bench = Bench()
-    setattr(bench.far.drives[0], name, value)
-    return bench
+@pytest.mark.parametrize("case", ODD, ids=lambda case: f"{case.row} {case.fault}")
+def test_odd_nodes_are_tolerated_and_noted(case):
+    tolerate(case)
 
 
-@pytest.mark.parametrize(
-    "bench",
-    [partial(_spoilt, "autostart", True), partial(_spoilt, "boot_delay", 4.0)],
-    ids=["16 starts by itself", "16 boots after 4 s"],
-)
-def test_16_odd_starters_are_tolerated(bench):
-    far = bench().opened()
-    far.link.arm(ZERO)
-    far.close()
-
-
-def test_16_emergency_at_boot_is_noted():
-    bench = Bench()
-    plain = bench.far.drives[2]._booted
-    bench.far.drives[2]._booted = lambda now: (plain(now), bench.far.drives[2].emergency(0x8140))
-    bench.opened()
-    assert bench.link.notes == ["drive 3 sent EMCY 0x8140 at boot"]
-    bench.close()
-
-
-def test_18_counter_in_sync_only_where_all_nodes_accept_it():
+def test_18_counter_in_sync_where_all_nodes_accept_it():
     bench = Bench(sync_counter=True).opened()
     assert bench.link.machine.found.sync_counter
-    bench.close()
-    bench = Bench(sync_counter=True)
-    del bench.far.drives[3].dictionary.entries[0x1019, 0]
-    bench.opened()
-    assert not bench.link.machine.found.sync_counter
-    assert bench.link.notes[0].startswith("drive 4 has no 0x1019:00")
-    bench.close()
-
-
-def test_18_node_that_refuses_the_counter_all_the_same():
-    """It takes 0x1019 and answers SYNC with EMCY 0x8240: nobody gets a counter."""
-    bench = Bench(sync_counter=True)
-    drive = bench.far.drives[3]
-    plain = drive.sync_accepted
-    drive.sync_accepted = lambda data: plain(data[:0]) if not data else (drive.emergency(0x8240), False)[1]
-    bench.opened()
-    assert not bench.link.machine.found.sync_counter
-    assert "EMCY 0x8240" in bench.link.notes[0]
-    bench.link.arm(ZERO)
     bench.close()
 
 
@@ -172,17 +132,6 @@ def test_11_reference_of_a_node_that_was_reset_is_gone(tmp_path):
     with pytest.raises(DriveError, match="not referenced: drive 2; nothing may move"):
         again.link.arm(ZERO)
     again.close()
-
-
-def test_18_absent_0x6007_needs_a_bench_test():
-    bench = Bench()
-    del bench.far.drives[3].dictionary.entries[0x6007, 0]
-    refused(bench, "drive 4 has no 0x6007:00 Abort connection option code: nothing is known")
-    bench = Bench(link_loss_tested=True)
-    del bench.far.drives[3].dictionary.entries[0x6007, 0]
-    bench.opened()
-    assert bench.link.notes == ["drive 4 has no 0x6007:00 Abort connection option code"]
-    bench.close()
 
 
 @pytest.mark.parametrize("position", [300.0, -215.0])

@@ -2,7 +2,7 @@ import pytest
 from trajectories import PAPER
 
 from cdhr_host.drives import LinkState, PacedClock, open_link
-from cdhr_host.errors import DriveError
+from cdhr_host.errors import DriveError, ProfileError
 
 
 def _open(url):
@@ -33,6 +33,15 @@ def test_unknown_links_are_refused_with_the_nearest(url, hint):
     with pytest.raises(DriveError, match="are not known") as caught:
         _open(url)
     assert caught.value.problems[0].hint.startswith(hint)
+
+
+def test_a_bus_that_would_be_too_full_is_refused_before_anything_is_started():
+    with pytest.raises(ProfileError, match=r"worst case \(limit 70%\) at 250 kbit/s") as caught:
+        _open("slcan:/dev/null@250000")
+    assert caught.value.problems[0].limit == 70.0
+    busy = PAPER.model_copy(update={"drives": PAPER.drives.model_copy(update={"period": 0.001})})
+    with pytest.raises(ProfileError, match="at 1000 kbit/s"):
+        open_link("socketcan:can0", busy, PacedClock(float("inf")))
 
 
 def test_loopback_takes_nothing():

@@ -205,6 +205,35 @@ def test_drives_stop_by_themselves_when_the_sender_dies(tmp_path, how):
     assert set(report["states"]) == {"switch_on_disabled"}
 
 
+def test_sender_asked_to_end_stops_on_the_path_and_leaves_nothing_behind(tmp_path):
+    """SIGTERM, as when a computer is shut down; no shared memory has a name by then."""
+    with running(tmp_path) as (far, link, rows):
+        rings = (link._rows, link._results, link._revisions)
+        assert not [ring.name for ring in rings if (Path("/dev/shm") / ring.name).exists()]
+        pid = link.pid
+        os.kill(pid, signal.SIGTERM)
+        _until(lambda: _zombie(pid))
+        with pytest.raises(DriveError, match="the sending process"):
+            link.feedback()
+        report = far.end()
+        received = np.loadtxt(far.record, delimiter=",", skiprows=1)[:, :6]
+    assert report["at_rest"]
+    assert report["lost_ticks"] == 0
+    assert set(report["states"]) == {"switch_on_disabled"}
+    moved = received[np.abs(np.diff(received, axis=0, prepend=received[:1])).max(axis=1) > 0]
+    path = rows.slider / link.resolution
+    beside = np.array([_beside(point, path) for point in moved[-100:]])
+    assert beside.max() < 10.0  # units of 0.1 µm: the chords of the path explain them
+
+
+def _beside(point, path):
+    """Distance of a point from the chords of a path."""
+    begin, along = path[:-1], np.diff(path, axis=0)
+    square = np.maximum((along**2).sum(axis=1), 1e-12)
+    share = np.clip(((point - begin) * along).sum(axis=1) / square, 0.0, 1.0)
+    return np.linalg.norm(begin + share[:, None] * along - point, axis=1).min()
+
+
 def test_unplugged_far_side_is_a_fault_of_the_next_cycle(tmp_path):
     with running(tmp_path) as (far, link, _):
         far.end(signal.SIGKILL)

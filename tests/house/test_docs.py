@@ -16,6 +16,27 @@ from looking import ROOT
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
 BLOCK = re.compile(r"^```console\n(.*?)^```", re.DOTALL | re.MULTILINE)
+SHOWN = re.compile(r"^```(?!python|mermaid)\w*\n(.*?)^```|^((?: {4}.*\n)+)", re.DOTALL | re.MULTILINE)
+"""every block that is not Python"""
+COMMAND = re.compile(r"(?:\$ )?((?:cdhr|dask|curl|python3?|pip|prusa-slicer|CuraEngine|xset|systemctl) .*)")
+LONG = "minutes of CPU: tests/report/test_reproduce.py tries its items"
+SLICER = "needs a slicer and a part: tests/shipped/test_slicers.py makes one and runs it"
+ELSEWHERE = {
+    "cdhr jog": "a screen: tests/cli/test_jog_terminal.py",
+    "cdhr jog --drives slcan:/dev/ttyACM0@1000000 --profile mine.toml": "a screen and a real adapter: "
+    "tests/cli/test_jog_terminal.py takes a simulated one",
+    "cdhr calibrate clay cups.csv steps.csv --plot fit.png --write my-stoneware": "needs a weighed run: "
+    "tests/cli/test_calibrate_clay.py simulates one",
+    "cdhr reproduce": LONG,
+    "cdhr reproduce --table 2": LONG,
+    "cdhr reproduce --quick": LONG,
+    "prusa-slicer --load profiles/slicers/paper-wide.ini --center 0,0 --export-gcode -o pot.gcode "
+    "pot.stl": SLICER,
+    "CuraEngine slice -j profiles/slicers/cdhr_paper_wide.def.json -o pot.gcode -e0 -l pot.stl": SLICER,
+    "cdhr dry-run pot.gcode --profile paper-wide": SLICER,
+    "python3 -m venv .venv && . .venv/bin/activate && python3 -m pip install .": "what .ci/run begins with",
+}
+"""commands that a page shows and this test does not run, and why"""
 LIMIT = 400
 """s that a page's commands may take"""
 
@@ -36,12 +57,12 @@ def session(commands: list[str], at: Path) -> list[str]:
     tools = at / "tools"
     tools.mkdir()
     shim = tools / "cdhr"
-    shim.write_text(f'#!/bin/sh\nPYTHONPATH="{ROOT}" exec "{sys.executable}" -m cdhr_host "$@"\n')
+    shim.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m cdhr_host "$@"\n')
     shim.chmod(0o755)
     (at / "gcode").symlink_to(ROOT / "gcode")
     steps = (f"{{ {command}\n}} > {tools}/{i}.out 2>&1" for i, command in enumerate(commands))
     script = "\n".join(("trap 'kill $(jobs -p) 2> /dev/null; wait' EXIT", *steps))
-    home = {"HOME": str(tools), "XDG_STATE_HOME": str(tools / "state")}
+    home = {"HOME": str(tools), "XDG_STATE_HOME": str(tools / "state"), "PYTHONPATH": str(ROOT)}
     path = os.pathsep.join((str(tools), str(Path(sys.executable).parent), os.environ["PATH"]))
     shell = subprocess.Popen(
         ["bash", "-u", "-c", script],
@@ -67,6 +88,21 @@ def agrees(printed: str, shown: str) -> bool:
         for line in shown.strip("\n").splitlines()
     )
     return re.fullmatch("".join(lines), printed.strip("\n") + "\n") is not None
+
+
+def commands() -> list[str]:
+    """Every command that any page shows, without its comment."""
+    texts = ("".join(block) for page in PAGES for block in SHOWN.findall(page.read_text(encoding="utf-8")))
+    found = (COMMAND.match(line.strip()) for text in texts for line in text.splitlines())
+    return [re.sub(r" +#.*", "", match[1]) for match in found if match]
+
+
+def test_every_command_of_every_page_is_run_or_says_where_it_is() -> None:
+    run = {command for page in PAGES for command, _ in examples(page)}
+    left = {command for command in commands() if not any(whole.startswith(command) for whole in run)}
+    assert left == set(ELSEWHERE)
+    tests = re.findall(r"tests/[\w/]+\.py", " ".join(ELSEWHERE.values()))
+    assert all((ROOT / test).is_file() for test in tests)
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if examples(page)], ids=lambda page: page.stem)

@@ -8,10 +8,11 @@ import pytest
 from stepped import Stepped
 
 from cdhr_host.drives import Loopback
-from cdhr_host.errors import JobError
+from cdhr_host.errors import JobError, MotionError, Problem
 from cdhr_host.job.printer import Printer
 from cdhr_host.job.surface import Event, JobState
 from cdhr_host.pipeline import Staircase, open_profile
+from cdhr_host.pipeline.arriving import Arriving
 from cdhr_host.values import Feedback, Setpoints
 
 PROFILE = open_profile("paper")
@@ -98,6 +99,75 @@ def test_a_long_even_bead_has_no_stop_in_it() -> None:
     speed = np.linalg.norm(np.diff(bench.nozzle(), axis=0), axis=1) / PROFILE.drives.period
     moving = np.flatnonzero(speed > 1e-4)
     assert speed[moving[0] + 600 : moving[-1] - 400].min() > 0.01
+
+
+def test_a_pause_before_which_all_was_sent_is_resumed_and_held_again() -> None:
+    bench = Bench()
+    bench.send("G1 X10 F1800", "M0 more clay")
+    for _ in range(2):
+        bench.until(lambda: bench.state is JobState.HELD)
+        bench.printer.resume()
+        bench.until(lambda: bench.state is JobState.PRINTING)
+        bench.turns(20)
+        bench.printer.hold()
+    bench.until(lambda: bench.state is JobState.HELD)
+    bench.printer.resume()
+    bench.send("G1 X20")
+    bench.feed.finish()
+    bench.until(lambda: bench.state is JobState.DONE)
+    assert bench.nozzle()[-1] == pytest.approx([0.02, 0.0, 0.0], abs=1e-6)
+
+
+@pytest.mark.parametrize("pauses", [True, False])
+def test_a_held_stream_goes_on_where_it_stood_after_a_jog(pauses: bool) -> None:
+    bench = Bench()
+    bench.send("G1 X10 F1800", *(["M0 more clay"] if pauses else []), "G1 X20")
+    if not pauses:
+        bench.until(lambda: bool(bench.rows) and bench.nozzle()[-1, 0] > 0.003)
+        bench.printer.hold()
+    bench.until(lambda: bench.state is JobState.HELD)
+    stood = np.array([0.01, 0.0, 0.0]) if pauses else bench.nozzle()[-1]
+    jog = bench.printer.run("G91\nG1 Z15 F1800\nG1 Y5")
+    bench.until(jog.done)
+    assert jog.result().ok
+    before = sum(map(len, bench.rows))
+    bench.printer.resume()
+    bench.feed.finish()
+    bench.until(lambda: bench.state is JobState.DONE)
+    after = bench.nozzle()[before:]
+    assert after[-1] == pytest.approx([0.02, 0.0, 0.0], abs=1e-6)
+    assert np.abs(np.diff(after, axis=0)).max() < 0.1 * PROFILE.drives.period + 1e-9
+    down = after[np.argmax(after[:, 2] < 1e-6)]
+    assert down == pytest.approx(stood, abs=1e-5)
+
+
+@pytest.mark.parametrize("moving", [True, False])
+def test_a_line_found_impossible_late_is_named_with_what_to_do(
+    monkeypatch: pytest.MonkeyPatch, moving: bool
+) -> None:
+    bench = Bench()
+    bench.send("G1 X10 F600")
+    bench.until(lambda: bool(bench.rows) or not moving)
+    problem = Problem("force", "cable 3 would carry 0.3 N, less than 0.5 N", 2, value=0.3, limit=0.5)
+    told = [problem]
+
+    def rows(first: int, last: int) -> Setpoints:
+        if told and first == bench.feed._seen:
+            raise MotionError([told.pop()])
+        return Arriving.rows(bench.feed.course, first, last)
+
+    monkeypatch.setattr(bench.feed.course, "rows", rows)
+    bench.send("G1 X20")
+    bench.until(lambda: bench.state is JobState.HELD)
+    assert bench.printer.status().message.startswith("line 2 cannot be moved: cable 3 would carry 0.3 N")
+    (event,) = [event for event in bench.events if event.problem is not None]
+    assert event.problem.line == 2
+    assert (event.problem.value, event.problem.limit) == (0.3, 0.5)
+    assert "cancel it, then send that line slower" in str(event.problem.hint)
+    with pytest.raises(JobError, match="cannot be moved"):
+        bench.printer.resume()
+    bench.printer.abort()
+    bench.until(lambda: bench.state is JobState.STOPPED)
 
 
 def test_a_slow_bead_has_no_stop_in_it_and_ends_soon_after_its_client_has() -> None:

@@ -1,5 +1,6 @@
 """Lines, numbers, checksums, answers: what each Marlin client relies on."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -183,5 +184,21 @@ def test_a_long_line_is_dropped_as_a_whole(tmp_path: Path) -> None:
     def act(client: Client) -> None:
         assert client.say("G1 X1" + "0" * 5000)[:1] == []
         assert client.say("\nM105\n")[:2] == ["echo:a line longer than 1024 bytes was dropped", "ok"]
+
+    with_client(act, tmp_path)
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_g28_homes_a_machine_that_is_not_referenced_before_anything_is_streamed(
+    tmp_path: Path, known: bool
+) -> None:
+    async def act(client: Client) -> None:
+        surface = client.surface
+        surface._status = replace(surface.status(), referenced=known)
+        said = client.say("G28\n")
+        said += await client.settle()
+        assert said == ["ok"]
+        assert ("run", "G28") in surface.said or known
+        assert bool(surface.feeds) == known
 
     with_client(act, tmp_path)

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from marlin_client import Client, with_client
 
-from cdhr_host.errors import Problem
-from cdhr_host.job.surface import JobState
+from cdhr_host.errors import JobError, Problem
+from cdhr_host.job.surface import JobState, LineFeed
 from cdhr_host.serve.marlin.engine import QUEUE_MAX
 
 
@@ -189,5 +189,30 @@ def test_problems_while_streaming_are_no_errors(tmp_path: Path) -> None:
         assert "//action:paused" in heard
         assert any("outside the bed" in line for line in heard)
         assert not [line for line in heard if line.startswith(("Error", "!!"))]
+
+    with_client(act, tmp_path)
+
+
+def test_lines_as_other_senders_write_them(tmp_path: Path) -> None:
+    def act(client: Client) -> None:
+        assert client.say("g1x2f600\r\nG01 X3. ; a comment *5\rG1 X4\r\n") == ["ok", "ok", "ok"]
+        assert client.surface.feeds[0].lines[-3:] == ["g1x2f600", "G01 X3.", "G1 X4"]
+
+    with_client(act, tmp_path)
+
+
+def test_a_line_sent_while_something_else_moves_waits_for_it(tmp_path: Path) -> None:
+    def act(client: Client) -> None:
+        opened = client.surface.open_stream
+
+        def busy(_: str) -> LineFeed:
+            raise JobError(Problem("busy", "the machine still moves", hint="wait until it stands"))
+
+        client.surface.open_stream = busy
+        assert client.say("G28\n") == []
+        assert client.wait(2.5) == ["echo:busy: processing"]
+        client.surface.open_stream = opened
+        assert client.wait() == ["ok"]
+        assert client.surface.feeds[0].lines[-1] == "G28"
 
     with_client(act, tmp_path)

@@ -39,14 +39,15 @@ def bus_load(profile: Profile, bit_rate: int = BIT_RATE) -> BusLoad:
     return BusLoad(bits, bits / (profile.drives.period * bit_rate) + background)
 
 
-def bus_share(profile: Profile) -> float:
+def bus_share(profile: Profile, bit_rate: int = BIT_RATE) -> float:
     """The share of the bus a profile fills in the worst case; ProfileError above REFUSED_ABOVE."""
-    load = bus_load(profile)
+    load = bus_load(profile, bit_rate)
     if load.share > REFUSED_ABOVE:
         raise ProfileError(
             Problem(
                 "bus-load",
-                f"the CAN bus would be {load.share:.0%} full in the worst case (limit {REFUSED_ABOVE:.0%})",
+                f"the CAN bus would be {load.share:.0%} full in the worst case "
+                f"(limit {REFUSED_ABOVE:.0%}) at {bit_rate // 1000} kbit/s",
                 key="canopen.feedback_every",
                 value=round(100 * load.share, 1),
                 limit=100 * REFUSED_ABOVE,

@@ -53,7 +53,8 @@ def _on_cluster(work: Callable[[J], R], jobs: Sequence[J], scheduler: str) -> It
     try:
         client = Client(scheduler, timeout=PATIENCE)  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
-        raise ClusterError(f"no Dask scheduler answers at {scheduler}: {error}") from error
+        hint = "hint: dask scheduler starts one; without --scheduler all cores of this machine work"
+        raise ClusterError(f"no Dask scheduler answers at {scheduler}: {error}\n{hint}") from error
     with client:
         versions = client.run(_version)
         if not versions:

@@ -1,5 +1,6 @@
 """What each command of a Marlin client does here, and its answer."""
 
+import asyncio
 import re
 from collections.abc import Callable
 from typing import Final
@@ -97,6 +98,8 @@ class Commands:
 
     def _program_word(self, code: str, line: str, *, numbered: bool) -> Answer:
         """A word of programs: refused at once when it is typed alone, else the stream's to judge."""
+        if code == "G28" and not self._bench.status().referenced:
+            return self._home()
         alone = not numbered and not self._bench.pending
         if alone and (problems := parse_line(line, 1)[1]):
             return [*(f"echo:{problem_text(problem)}" for problem in problems[:3]), *OK]
@@ -104,12 +107,25 @@ class Commands:
             return self._pause(line)
         return self._stream(line, typed=alone)
 
+    def _home(self) -> Answer:
+        """Drives that know no reference pose find it before anything is streamed; until then no ok."""
+        running = asyncio.ensure_future(self._bench.host.run("G28"))
+
+        def over() -> list[str] | None:
+            if not running.done():
+                return None
+            reply = running.result()
+            return OK if reply.ok else [*(f"echo:{text}" for text in reply.lines), *OK]
+
+        return over
+
     def _stream(self, line: str, *, typed: bool) -> Answer:
         def taken() -> list[str] | None:
             try:
                 return OK if self._bench.offer(line, typed=typed) else None
             except JobError as error:
-                return [f"echo:{problem_text(error.problems[0])}", *OK]
+                still_moves = error.problems[0].kind == "busy"
+                return None if still_moves else [f"echo:{problem_text(error.problems[0])}", *OK]
 
         return taken() or taken
 

@@ -79,6 +79,8 @@ class Numbering:
     def check(self, raw: str) -> Line | Damaged | Dropped:
         """One line as it came."""
         found = _NUMBERED.match(raw)
+        if found is None:
+            raw = raw.partition(";")[0]
         star = _CHECKSUM.search(raw)
         body = raw[found.end() if found else 0 : star.start() if star else len(raw)].strip()
         if star is not None and _checksum(raw[: star.start()].lstrip()) != int(star[1]):
