@@ -30,6 +30,8 @@ from cdhr_host.units import MM
 
 RADIUS, LAYER, FEED = 60.0, 1.25, 1200
 """mm, mm, mm/min of the rings that are printed"""
+DRIVES = 6
+"""exit code of a host whose drives did not answer: it is started again"""
 SETTLED = 20.0
 """s of a host's life from which on its memory is compared"""
 HOURLY = {"hold": 40, "override": 40, "interrupt": 5, "fault": 4, "stop": 4, "kill": 7}
@@ -143,10 +145,13 @@ class Soak:
             elif "begins it anew" in self.host.said and not seams:
                 self.host.gone()
                 self.start(*fresh)
+            elif self.host.ended == DRIVES:
+                self.tally.events["not opened"] = self.tally.events.get("not opened", 0) + 1
             else:
                 raise SystemExit(f"no resume: {self.host.said}")
         self.judge(first, seams, whole=code == 0)
         self.tally.prints += 1
+        print(json.dumps(self.summary(), default=str), file=sys.stderr, flush=True)
         if not self.over:
             self.home()
 
@@ -242,6 +247,18 @@ class Soak:
             tally.wrong.append({"print": tally.prints, "host": self.number, **asdict(found)})
             print(json.dumps(tally.wrong[-1]), file=sys.stderr, flush=True)
 
+    def summary(self):
+        """So far."""
+        record = asdict(self.tally)
+        within = sum(twice <= stated + MENDED / MM for twice, stated in record["seams"])
+        return {
+            **record,
+            "seams": len(record["seams"]),
+            "seams_as_told": within,
+            "memory_far": growth(self.memory.far),
+            "memory_hosts": growth(self.memory.hosts),
+        }
+
     def say(self, code):
         minutes = (self.end - time.monotonic()) / 60.0
         events = " ".join(f"{what} {count}" for what, count in sorted(self.tally.events.items()))
@@ -269,14 +286,7 @@ def main():
         where.mkdir(parents=True, exist_ok=True)
         soak = Soak(where, asked)
         lost = soak.run()
-    record = {
-        **asdict(soak.tally),
-        "cycles_guessed": lost,
-        "memory_far": growth(soak.memory.far),
-        "memory_hosts": growth(soak.memory.hosts),
-    }
-    within = sum(twice <= stated + MENDED / MM for twice, stated in record["seams"])
-    print(json.dumps({**record, "seams": len(record["seams"]), "seams_as_told": within}, indent=1))
+    print(json.dumps({**soak.summary(), "cycles_guessed": lost}, indent=1))
     sys.exit(bool(soak.tally.wrong))
 
 
