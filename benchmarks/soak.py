@@ -70,6 +70,8 @@ class Tally:
     astray_um: float = 0.0
     wrong: list = field(default_factory=list)
     seams: list = field(default_factory=list)
+    reactions_ms: list = field(default_factory=list)
+    """from the key to the first slower setpoint, of holds in a steady bead"""
 
 
 class Memory(threading.Thread):
@@ -188,11 +190,27 @@ class Soak:
         return weights / weights.sum()
 
     def hold(self):
+        pressed = time.monotonic()
         self.host.press(b" ")
         self.host.becomes("held", "done", "fault")
+        if (waited := self.reaction(pressed)) is not None:
+            self.tally.reactions_ms.append(round(1e3 * waited))
         time.sleep(float(self.random.uniform(0.0, 3.0)))
         if self.host.ended is None and self.host.journal.state == "held":
             self.host.press(b" ")
+
+    def reaction(self, pressed):
+        """s from a key to the first slower setpoint; None where the bead was not steady before."""
+        size = RECORD.itemsize
+        first = max(self.far.written // size - 5000, 0)
+        record = np.fromfile(self.far.file, RECORD, offset=first * size)
+        step = np.linalg.norm(np.diff(record["told"], axis=0), axis=1)
+        at = record["at"][1:]
+        before, after = step[(at > pressed - 0.5) & (at <= pressed)], at > pressed
+        if not len(before) or before.min() < 0.98 * before.max() or not before.min():
+            return None
+        slower = np.flatnonzero(after & (step < 0.97 * before.min()))
+        return float(at[slower[0]] - pressed) if len(slower) else None
 
     def override(self):
         wanted = float(self.random.uniform(0.6, 1.8))
