@@ -132,12 +132,22 @@ def _serve(
             server = Server(printer, doors)
             asyncio.run(server.run(lambda: _told(server, json_=json_)))
         except OSError as error:
-            raise Refusal(f"cdhr: error: cannot open a door: {error.strerror or error}") from error
+            raise Refusal(
+                f"cdhr: error: cannot open a door: {_what_failed(error)}\n"
+                "hint: cdhr serve --help tells what names and moves each door"
+            ) from error
         finally:
             printer.close()
     finally:
         link.close()
     return server.interrupted
+
+
+def _what_failed(error: OSError) -> str:
+    """With the name that it is about, where there is one."""
+    name = error.filename2 or error.filename
+    where = f"{name}: " if name is not None else ""
+    return f"{where}{error.strerror or error}"
 
 
 def _told(server: "Server", *, json_: bool) -> None:
