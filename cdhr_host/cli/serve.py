@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdhr_host.cli.machine import SIMULATED, open_machine, opened
-from cdhr_host.cli.options import DrivesUrl, Json, MaterialName, ProfileName, examples
+from cdhr_host.cli.options import DrivesUrl, Json, MaterialName, ProfileName, Speed, examples
 from cdhr_host.cli.refusals import INTERRUPTED, Refusal, emit, say
 
 if TYPE_CHECKING:
@@ -64,9 +64,7 @@ def serve(
     profile: ProfileName = "paper",
     material: MaterialName = None,
     drives: DrivesUrl = SIMULATED,
-    speed: Annotated[
-        float, typer.Option(metavar="X", help="Run the simulated drives X times faster.", min=0.01)
-    ] = 1.0,
+    speed: Speed = 1.0,
     marlin: MarlinPath = None,
     tcp: TcpPort = None,
     http: HttpPort = 7125,
@@ -102,6 +100,7 @@ def serve(
         open_machine(profile, material), (profile, material), drives, speed, doors, json_=json_
     )
     if interrupted:
+        say("cdhr: the print rests on its path; cdhr resume goes on with it, if it was an uploaded program")
         raise typer.Exit(INTERRUPTED)
 
 
