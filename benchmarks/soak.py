@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 from far_side import RECORD
 from hosts import PATIENCE, FarSide, Host, LateError, environment, resident, tolerant, until
-from laid import MENDED, Bead, Seam
+from laid import Bead, Seam
 
 from cdhr_host.pipeline import open_profile
 from cdhr_host.units import MM
@@ -268,11 +268,9 @@ class Soak:
     def summary(self):
         """So far."""
         record = asdict(self.tally)
-        within = sum(twice <= stated + MENDED / MM for twice, stated in record["seams"])
         return {
             **record,
             "seams": len(record["seams"]),
-            "seams_as_told": within,
             "memory_far": growth(self.memory.far),
             "memory_hosts": growth(self.memory.hosts),
         }

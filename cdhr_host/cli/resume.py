@@ -79,8 +79,8 @@ def resume(
                 summary = printed(replace(run, recovery=found.recovery, goes_on=str(past.path)), log)
     finally:
         link.close()
-    extra = {"resumed": record(past, found)}
-    _summed_up(summary, program, source, names.profile, extra if json_ else None)
+    resumed = record(past, found) if json_ else None
+    _summed_up(summary, program, source, names.profile, resumed)
 
 
 def _interrupted(journal: Path | None) -> "tuple[Journal, Profile, Source]":
@@ -92,13 +92,14 @@ def _interrupted(journal: Path | None) -> "tuple[Journal, Profile, Source]":
 
 
 def _summed_up(
-    summary: "RunSummary", program: "Program", source: Source, profile: str, extra: dict[str, object] | None
+    summary: "RunSummary", program: "Program", source: Source, profile: str, resumed: dict[str, object] | None
 ) -> None:
-    """Print what was done, as JSON where there is something ``extra``; exit 130 where it was interrupted."""
+    """Print what was done, as JSON where it is to say how it was resumed; exit 130 if it was interrupted."""
     from cdhr_host.report.run import run_lines, run_record
 
-    if extra is not None:
-        emit(json.dumps({**run_record(summary, program.proof, source.name, profile), **extra}))
+    if resumed is not None:
+        done = run_record(summary, program.proof, source.name, profile)
+        emit(json.dumps({**done, "resumed": resumed}))
     else:
         emit("\n".join(run_lines(summary, program.proof, source.name)))
     if summary.interrupted:
