@@ -298,7 +298,7 @@ def test_a_pause_of_the_program_holds() -> None:
     bench = Bench()
     bench.send("G1 X10 F1800", "M0 more clay", "G1 X20")
     bench.until(lambda: bench.state is JobState.HELD)
-    assert bench.nozzle()[-1] == pytest.approx([0.0, 0.0, 0.02], abs=1e-6)
+    assert bench.nozzle()[-1] == pytest.approx([0.01, 0.0, 0.0], abs=1e-6)
     bench.printer.resume()
     bench.feed.finish()
     bench.until(lambda: bench.state is JobState.DONE)
