@@ -37,6 +37,8 @@ NEAR: Final = 0.3 * MM
 """how far the nozzle may stand from the path and still count as on it"""
 FINE: Final = 0.5
 """ticks between places at which the nozzle is looked for"""
+BEGUN: Final = 2.0
+"""ticks by which a link's own stop may have begun later than is found: both its ends are rounded to rows"""
 BACK: Final = 60.0
 """s of plan looked back over for the overlap"""
 Stops = Callable[[Setpoints], Setpoints]
@@ -161,7 +163,7 @@ class Resuming:
         rested = rested if stop is None else min(rested, stop.tick - 1.0)
         tick = self._before(course, bead, overlap)
         line, place = self._line(course, tick), self._place(course, tick)
-        twice = self._length(course, tick, bead if sure else rested) + away
+        twice = self._length(course, tick, min(bead + BEGUN, rested) if sure else rested) + away
         return Recovery(tick, line, place, bead, rested, twice, away, sure)
 
     def _check_plan(self, course: Course, last: Executed) -> None:

@@ -19,7 +19,7 @@ from trajectories import PAPER, changed, run_of
 from cdhr_host.drives import LinkState, MonotonicClock
 from cdhr_host.drives.rows import joined
 from cdhr_host.drives.sender import SenderLink
-from cdhr_host.drives.sender.far import CAPACITY, RESULTS, REVISION, Sender, Spec, Word, tested
+from cdhr_host.drives.sender.far import CAPACITY, RESULTS, REVISION, Sender, Spec, Word, timing_told
 from cdhr_host.drives.sender.ring import FEEDBACK, SETPOINTS, Ring, feedback, packed, setpoints, width
 from cdhr_host.drives.timing import CycleTiming
 from cdhr_host.errors import DriveError, Problem
@@ -97,8 +97,8 @@ def test_timing_test_is_told(soft, worst, said):
     profile = PAPER.model_copy(
         update={"canopen": PAPER.canopen.model_copy(update={"allow_soft_realtime": soft})}
     )
-    assert tested(timing(worst), profile).endswith(said)
-    assert "without real-time priority" in tested(timing(worst, real_time=False), profile)
+    assert timing_told(timing(worst), profile).endswith(said)
+    assert "without real-time priority" in timing_told(timing(worst, real_time=False), profile)
 
 
 @pytest.mark.parametrize("soft", [False, True])

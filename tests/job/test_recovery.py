@@ -185,7 +185,7 @@ def test_a_print_killed_soon_after_a_pause_goes_on(tmp_path: Path) -> None:
     while printer.state is not JobState.HELD:
         machine.run(printer, machine.clock.now() + 0.1)
     printer.resume()
-    machine.run(printer, machine.clock.now() + 4.0)
+    machine.run(printer, machine.clock.now() + 1.5)
     machine.killed()
     recovery = resumed(machine, program)
     assert recovery.line == 4

@@ -108,7 +108,7 @@ def hurry() -> bool:
     return True
 
 
-def tested(found: CycleTiming, profile: Profile) -> str:
+def timing_told(found: CycleTiming, profile: Profile) -> str:
     """What the timing test says to an operator."""
     limit = JITTER * profile.drives.period
     text = f"timing test: p99.9 {found.p999 * 1e3:.3f} ms, worst {found.max * 1e3:.3f} ms late"
@@ -212,7 +212,7 @@ class Sender:
             self._link.turn()
         found = lateness.summary()
         self._punctual = found.max < JITTER * self._profile.drives.period
-        return [*self._link.notes, tested(found, self._profile)]
+        return [*self._link.notes, timing_told(found, self._profile)]
 
     def _do_arm(self, start: list[float]) -> None:
         if not self._punctual and not self._profile.canopen.allow_soft_realtime:
