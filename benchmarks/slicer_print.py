@@ -54,9 +54,8 @@ def begun(file, lines, folder):
     if lines is None:
         return str(file)
     part = folder / file.name
-    part.write_text(
-        "".join(file.read_text(encoding="utf-8").splitlines(keepends=True)[:lines]), encoding="utf-8"
-    )
+    with file.open("rb") as text:
+        part.write_bytes(b"".join(islice(text, lines)))
     return str(part)
 
 
