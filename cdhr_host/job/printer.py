@@ -220,6 +220,7 @@ class Printer:
         if self._thread is not None:
             self._thread.join()
         self._acts.end(self._state)
+        self._telling.tell(self.status)
         self._executor.shutdown(wait=False, cancel_futures=True)
 
     def turn(self) -> None:

@@ -130,6 +130,7 @@ def test_a_following_error_stops_the_run_and_keeps_its_log(
     result = cdhr("stream", RING, "--profile", str(profile), "--log", str(log), *FAST)
     assert result.exit_code == 6
     assert re_line(result.stderr, RING, "mm away from its setpoint")
+    assert "the last minute is in " in result.stderr
     table = pq.read_table(log)
     assert 0 < table.num_rows < 13000
     assert table["pressure_kpa"].to_numpy()[-1] == 0
