@@ -256,7 +256,7 @@ def _away(points, curve):
 
 
 def _thinned(curve):
-    """The curve's first vertex in every APART of its way: where it rests or creeps, none hide its other passes."""
+    """First vertex in every APART of a curve: where it rests or creeps, none hide its other passes."""
     way = np.cumsum(np.linalg.norm(np.diff(curve, axis=0), axis=1))
     piece = np.floor(np.append(0.0, way) / APART)
     return curve[np.append(True, np.diff(piece) > 0)]

@@ -83,7 +83,7 @@ def main():
     options.add_argument("--link", type=Path, required=True)
     options.add_argument("--record", type=Path, required=True)
     asked = options.parse_args()
-    with asked.record.open("ab", buffering=1 << 15) as record, Terminal(asked.link) as terminal:
+    with asked.record.open("ab", buffering=0) as record, Terminal(asked.link) as terminal:
         far = Far(asked.bus, open_profile(asked.profile), record)
         print(f"{asked.bus}:{asked.link}@{RATES[asked.bus]}", flush=True)
         serve(terminal, far, lambda: far.ended, lambda: False)

@@ -3,6 +3,7 @@
     python benchmarks/slicer_print.py gcode/prusa_tile_infill_volE.gcode
     python benchmarks/slicer_print.py gcode/prusa_tile_infill_volE.gcode --bus link
     python benchmarks/slicer_print.py gcode/prusa_tile_infill_volE.gcode --mode ip
+    python benchmarks/slicer_print.py --smoke      its first moves only
 
 ``cdhr dry-run``, ``cdhr sim`` and ``cdhr stream`` as processes, in real time, with the profile's own
 watchdog; then the dry run's log, rounded to the drives' units, is compared with what the far side
@@ -15,6 +16,7 @@ import json
 import subprocess
 import sys
 import tempfile
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +25,7 @@ from cdhr_host.profile import find, read_table, validate
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 CDHR = [sys.executable, "-m", "cdhr_host"]
+FILE = REPOSITORY / "gcode" / "prusa_tile_infill_volE.gcode"
 FULL = {"slcan": 32767.0, "link": 10_000.0}
 """raw pressure at full scale: 0x6411, and a bridge's tenths of a kPa (of 1000 kPa)"""
 
@@ -46,16 +49,27 @@ def planned(path, profile, full):
     return np.rint(np.column_stack([table[:, :6] / unit, air])).astype(np.int64)
 
 
+def begun(file, lines, folder):
+    """Path of a program of the file's first lines; of the file itself if all are wanted."""
+    if lines is None:
+        return str(file)
+    part = folder / file.name
+    with file.open("rb") as text:
+        part.write_bytes(b"".join(islice(text, lines)))
+    return str(part)
+
+
 def first_motion(counts):
     """Index of the first row that is not where it began."""
     return int(np.flatnonzero((counts[:, :6] != counts[0, :6]).any(axis=1))[0])
 
 
-def printed(file, bus, mode):
-    """One print; a record."""
+def printed(file, bus, mode, lines):
+    """One print of a file's first lines, None for all; a record."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         path, profile = machine(mode, folder)
+        file = begun(file, lines, folder)
         log, record = folder / "dry.csv", folder / "received.csv"
         profiled = ["--profile", str(path)]
         command = [*CDHR, "dry-run", file, *profiled, "--log", str(log)]
@@ -91,11 +105,14 @@ def compared(wanted, record, said):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("file")
+    parser.add_argument("file", nargs="?", type=Path, default=FILE)
     parser.add_argument("--bus", choices=FULL, default="slcan")
     parser.add_argument("--mode", choices=("csp", "ip"), default="csp")
+    parser.add_argument("--lines", type=int, help="of the file, from its first; all without")
+    parser.add_argument("--smoke", action="store_true", help="30 lines")
     arguments = parser.parse_args()
-    print(json.dumps(printed(str(Path(arguments.file).resolve()), arguments.bus, arguments.mode)))
+    lines = 30 if arguments.smoke else arguments.lines
+    print(json.dumps(printed(arguments.file.resolve(), arguments.bus, arguments.mode, lines)))
 
 
 if __name__ == "__main__":

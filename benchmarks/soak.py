@@ -23,13 +23,15 @@ from pathlib import Path
 import numpy as np
 from far_side import RECORD
 from hosts import PATIENCE, FarSide, Host, LateError, environment, resident, tolerant, until
-from laid import MENDED, Bead, Seam
+from laid import Bead, Seam
 
 from cdhr_host.pipeline import open_profile
 from cdhr_host.units import MM
 
 RADIUS, LAYER, FEED = 60.0, 1.25, 1200
 """mm, mm, mm/min of the rings that are printed"""
+DRIVES = 6
+"""exit code of a host whose drives did not answer: it is started again"""
 SETTLED = 20.0
 """s of a host's life from which on its memory is compared"""
 HOURLY = {"hold": 40, "override": 40, "interrupt": 5, "fault": 4, "stop": 4, "kill": 7}
@@ -68,6 +70,8 @@ class Tally:
     astray_um: float = 0.0
     wrong: list = field(default_factory=list)
     seams: list = field(default_factory=list)
+    reactions_ms: list = field(default_factory=list)
+    """from the key to the first slower setpoint, of holds in a steady bead"""
 
 
 class Memory(threading.Thread):
@@ -143,10 +147,13 @@ class Soak:
             elif "begins it anew" in self.host.said and not seams:
                 self.host.gone()
                 self.start(*fresh)
+            elif self.host.ended == DRIVES:
+                self.tally.events["not opened"] = self.tally.events.get("not opened", 0) + 1
             else:
                 raise SystemExit(f"no resume: {self.host.said}")
         self.judge(first, seams, whole=code == 0)
         self.tally.prints += 1
+        print(json.dumps(self.summary(), default=str), file=sys.stderr, flush=True)
         if not self.over:
             self.home()
 
@@ -183,11 +190,27 @@ class Soak:
         return weights / weights.sum()
 
     def hold(self):
+        pressed = time.monotonic()
         self.host.press(b" ")
         self.host.becomes("held", "done", "fault")
+        if (waited := self.reaction(pressed)) is not None:
+            self.tally.reactions_ms.append(round(1e3 * waited))
         time.sleep(float(self.random.uniform(0.0, 3.0)))
         if self.host.ended is None and self.host.journal.state == "held":
             self.host.press(b" ")
+
+    def reaction(self, pressed):
+        """s from a key to the first slower setpoint; None where the bead was not steady before."""
+        size = RECORD.itemsize
+        first = max(self.far.written // size - 5000, 0)
+        record = np.fromfile(self.far.file, RECORD, offset=first * size)
+        step = np.linalg.norm(np.diff(record["told"], axis=0), axis=1)
+        at = record["at"][1:]
+        before, after = step[(at > pressed - 0.5) & (at <= pressed)], at > pressed
+        if not len(before) or before.min() < 0.98 * before.max() or not before.min():
+            return None
+        slower = np.flatnonzero(after & (step < 0.97 * before.min()))
+        return float(at[slower[0]] - pressed) if len(slower) else None
 
     def override(self):
         wanted = float(self.random.uniform(0.6, 1.8))
@@ -242,6 +265,16 @@ class Soak:
             tally.wrong.append({"print": tally.prints, "host": self.number, **asdict(found)})
             print(json.dumps(tally.wrong[-1]), file=sys.stderr, flush=True)
 
+    def summary(self):
+        """So far."""
+        record = asdict(self.tally)
+        return {
+            **record,
+            "seams": len(record["seams"]),
+            "memory_far": growth(self.memory.far),
+            "memory_hosts": growth(self.memory.hosts),
+        }
+
     def say(self, code):
         minutes = (self.end - time.monotonic()) / 60.0
         events = " ".join(f"{what} {count}" for what, count in sorted(self.tally.events.items()))
@@ -269,14 +302,7 @@ def main():
         where.mkdir(parents=True, exist_ok=True)
         soak = Soak(where, asked)
         lost = soak.run()
-    record = {
-        **asdict(soak.tally),
-        "cycles_guessed": lost,
-        "memory_far": growth(soak.memory.far),
-        "memory_hosts": growth(soak.memory.hosts),
-    }
-    within = sum(twice <= stated + MENDED / MM for twice, stated in record["seams"])
-    print(json.dumps({**record, "seams": len(record["seams"]), "seams_as_told": within}, indent=1))
+    print(json.dumps({**soak.summary(), "cycles_guessed": lost}, indent=1))
     sys.exit(bool(soak.tally.wrong))
 
 

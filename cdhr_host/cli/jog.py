@@ -4,13 +4,13 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from cdhr_host.cli.interrupt import StopRequest
 from cdhr_host.cli.machine import SIMULATED, open_machine, opened
-from cdhr_host.cli.options import DrivesUrl, MaterialName, ProfileName, examples
+from cdhr_host.cli.options import DrivesUrl, MaterialName, ProfileName, Speed, examples
 from cdhr_host.cli.refusals import INTERRUPTED, Refusal, emit
 from cdhr_host.errors import CdhrError
 
@@ -31,9 +31,7 @@ def jog(
     profile: ProfileName = "paper",
     material: MaterialName = None,
     drives: DrivesUrl = SIMULATED,
-    speed: Annotated[
-        float, typer.Option(metavar="X", help="Run the simulated drives X times faster.", min=0.01)
-    ] = 1.0,
+    speed: Speed = 1.0,
 ) -> None:
     """Jog: a screen with keys and typed G-code on a terminal; lines of G-code from a pipe.
 

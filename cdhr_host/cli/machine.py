@@ -31,7 +31,10 @@ def opened(drives: str, machine: "Profile", speed: float) -> "tuple[MachineLink,
     if speed != 1.0 and not simulated:
         raise Refusal("cdhr: error: --speed is for simulated drives only\nhint: use M220 to print faster")
     clock = PacedClock(speed) if simulated else MonotonicClock()
-    return open_link(drives, machine, clock), clock
+    link = open_link(drives, machine, clock)
+    for note in link.notes:
+        say(f"{drives}: {note}")
+    return link, clock
 
 
 def check_log(log: Path | None, *, compact: bool = False) -> None:

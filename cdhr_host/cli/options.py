@@ -28,6 +28,7 @@ DrivesUrl = Annotated[
     str,
     typer.Option("--drives", metavar="URL", help="Where the drives are; loopback: simulates them here."),
 ]
+Speed = Annotated[float, typer.Option(metavar="X", help="Run the simulated drives X times faster.", min=0.01)]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 LogPath = Annotated[
     Path | None,

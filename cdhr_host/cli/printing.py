@@ -133,12 +133,15 @@ def _show(printer: "Printer", progress: Progress, speed: float) -> None:
 
 def _begun(printer: "Printer", run: Run) -> None:
     """At the beginning, or where an interrupted print goes on."""
+    from cdhr_host.job.surface import JobState
+
     if run.recovery is None:
         printer.start()
         return
     printer.recover(run.recovery, goes_on=run.goes_on)
     printer.turn()
-    printer.resume()
+    if printer.state is JobState.HELD:  # otherwise the drives have tripped, which is told by the caller
+        printer.resume()
 
 
 def _ended(printer: "Printer", run: Run, keys: Keys) -> bool:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cdhr_host.cli.machine import SIMULATED, open_machine, opened
-from cdhr_host.cli.options import DrivesUrl, Json, MaterialName, ProfileName, examples
+from cdhr_host.cli.options import DrivesUrl, Json, MaterialName, ProfileName, Speed, examples
 from cdhr_host.cli.refusals import INTERRUPTED, Refusal, emit, say
 
 if TYPE_CHECKING:
@@ -64,9 +64,7 @@ def serve(
     profile: ProfileName = "paper",
     material: MaterialName = None,
     drives: DrivesUrl = SIMULATED,
-    speed: Annotated[
-        float, typer.Option(metavar="X", help="Run the simulated drives X times faster.", min=0.01)
-    ] = 1.0,
+    speed: Speed = 1.0,
     marlin: MarlinPath = None,
     tcp: TcpPort = None,
     http: HttpPort = 7125,
@@ -102,6 +100,7 @@ def serve(
         open_machine(profile, material), (profile, material), drives, speed, doors, json_=json_
     )
     if interrupted:
+        say("cdhr: the print rests on its path; cdhr resume goes on with it, if it was an uploaded program")
         raise typer.Exit(INTERRUPTED)
 
 
@@ -132,12 +131,22 @@ def _serve(
             server = Server(printer, doors)
             asyncio.run(server.run(lambda: _told(server, json_=json_)))
         except OSError as error:
-            raise Refusal(f"cdhr: error: cannot open a door: {error.strerror or error}") from error
+            raise Refusal(
+                f"cdhr: error: cannot open a door: {_what_failed(error)}\n"
+                "hint: cdhr serve --help tells what names and moves each door"
+            ) from error
         finally:
             printer.close()
     finally:
         link.close()
     return server.interrupted
+
+
+def _what_failed(error: OSError) -> str:
+    """With the name that it is about, where there is one."""
+    name = error.filename2 or error.filename
+    where = f"{name}: " if name is not None else ""
+    return f"{where}{error.strerror or error}"
 
 
 def _told(server: "Server", *, json_: bool) -> None:

@@ -39,6 +39,11 @@ class BufferedLink:
         """Rows accepted whose outcome has not come back."""
         return len(self._buffer)
 
+    @property
+    def notes(self) -> list[str]:
+        """What an operator should know: nothing."""
+        return []
+
     def timing(self) -> CycleTiming | None:
         """Who has no cycles of its own is never late."""
         return None

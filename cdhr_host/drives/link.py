@@ -70,6 +70,11 @@ class MachineLink(Protocol):
         """(6,) m from the reference pose, where the sliders stand, as measured last; not while CLOSED."""
         ...
 
+    @property
+    def notes(self) -> list[str]:
+        """What an operator should know after ``open``: oddities of the drives, the timing test."""
+        ...
+
     def timing(self) -> CycleTiming | None:
         """How punctual the cycles since arming were; None for a link without cycles of its own."""
         ...

@@ -117,8 +117,9 @@ class AirStage(Generic[R]):
             return
         kept = None if self._rows is None else self._rows[self._rows.tick < tick]
         self._rows = kept if kept is not None and len(kept) else None
+        unsent = tick if self._rows is None else int(self._rows.tick[0])
         if self._past.cut(tick + self._open) and self._past.level > 0.0:
-            self._lasting = tick + self._close
+            self._lasting = unsent + self._close
 
     def _flow(self, rows: R) -> Array:
         if self._model.coast == 0.0:

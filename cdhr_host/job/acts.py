@@ -24,6 +24,8 @@ from cdhr_host.values import Feedback, Setpoints
 
 LIFTS = (1.0, 0.5, 0.25)
 """of the profile's lift, tried in this order after an abort"""
+UNFINISHED = MOVING | {JobState.HELD}
+"""states in which a print is not over"""
 Happen = Callable[[Word, str], None]
 
 
@@ -170,6 +172,7 @@ class Acts:
         """From rest on the path."""
         if self.player.aside is not None:
             self.player.take_up()
+        self.records.hasten(self.player.feed)
         self.player.go_on()
 
     def abort(self) -> None:
@@ -212,6 +215,7 @@ class Acts:
 
     def override(self, feed: float | None, flow: float | None, state: JobState) -> None:
         """Other shares from now on."""
+        self.records.hasten(max(feed or 0.0, self.player.feed))
         self.player.override(feed, flow, moving=state in {JobState.PRINTING, JobState.RESUMING})
         if feed is not None:
             self._lines.hasten(feed)
@@ -230,8 +234,8 @@ class Acts:
             self.player.link.stop()
         self.player.give_up()
 
-    def end(self) -> None:
-        """Bring the machine to rest for good."""
+    def end(self, state: JobState) -> None:
+        """Bring the machine to rest for good; a print that is left so has its black box."""
         with suppress(CdhrError):
             self.player.link.stop()
         self._collect_rest()
@@ -240,6 +244,8 @@ class Acts:
             self._collect_rest()
         if self.fault is not None:
             self.records.keep(self.fault.problems[0])
+        elif state in UNFINISHED:
+            self.records.keep(Problem("interrupted", self.message or f"ended while {state.value}"))
         self.records.end()
 
     def _collect_rest(self) -> None:
@@ -258,8 +264,8 @@ class Acts:
             return
         self._lines.turn(state)
         rest = self.player.turn()
-        if state is JobState.PRINTING and (alarm := self.records.alarm(self._clock.now())) is not None:
-            self._alarmed(alarm)
+        if (alarm := self.records.alarm(self._clock.now())) is not None:
+            self._alarmed(alarm, state)
         if self._count is not None:
             self._count.plan = self.player.plan_time(self._count.plan)
         if rest is None:
@@ -271,17 +277,19 @@ class Acts:
             self._rested(rest, state)
         elif rest.kind is Kind.LIFT:
             self.player.over()
-            self._happened(Word.LIFTED, self.message)
+            self._aborted(self.message)
         elif rest.kind is Kind.BACK:
             self.player.over()
             if state is JobState.RESUMING:
                 self._go_on()
             self._happened(Word.RESTED, self.message)
 
-    def _alarmed(self, alarm: Alarm) -> None:
-        """A watchdog: raises DriveError for what must stop at once, holds for the rest."""
+    def _alarmed(self, alarm: Alarm, state: JobState) -> None:
+        """Raises DriveError for what must stop at once, whatever moves; holds a print for the rest."""
         if alarm.reaction is Reaction.STOP:
             raise DriveError(alarm.problem)
+        if state not in {JobState.PRINTING, JobState.RESUMING}:
+            return
         self._telling.add("problem", alarm.problem.message, alarm.problem)
         self._happened(Word.HOLD, alarm.problem.message)
         self.player.hold()
@@ -297,7 +305,7 @@ class Acts:
         elif rest.stop is not None and rest.stop.pause is None and not rest.stop.waits:
             self.player.over()
             if state is JobState.STOPPING:
-                self._happened(Word.LIFTED, "")
+                self._aborted("")
             self._happened(Word.FINISHED, "")
         elif state is JobState.STOPPING:
             self._lift()
@@ -316,11 +324,16 @@ class Acts:
         wanted = self.player.profile.job.lift
         height = self.player.lift([share * wanted for share in LIFTS]) if wanted else 0.0
         if not wanted:
-            self._happened(Word.LIFTED, self.message)
+            self._aborted(self.message)
         elif not height:
             text = "no way straight up is free: the nozzle stays where it stopped"
             self._telling.add("message", text)
-            self._happened(Word.LIFTED, text)
+            self._aborted(text)
+
+    def _aborted(self, text: str) -> None:
+        """At rest after an abort, lifted or not."""
+        self._happened(Word.LIFTED, text)
+        self.records.keep(Problem("abort", text or "aborted"))
 
     def _executed(self, rows: Setpoints, feedback: Feedback) -> None:
         before = self._seen.rows

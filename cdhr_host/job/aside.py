@@ -40,11 +40,13 @@ class Aside:
         return cls(feeder.making, course, base, staircase, feeder.next_tick - 1, feeder.last.nozzle_G[-1])
 
     def way_back(self, at_G: Array, clear: float) -> Array:
-        """(N, 3) m: places on the way from another one, ``clear`` m above both; none when it is there."""
+        """(N, 3) m: places on the way from elsewhere, ``clear`` m above both and all clay; or none."""
         if np.abs(at_G - self.nozzle_G).max() <= THERE:
             return np.zeros((0, 3))
         across = float(np.linalg.norm(at_G[:2] - self.nozzle_G[:2]))
-        top = max(float(at_G[2]), float(self.nozzle_G[2])) + (clear if across > THERE else 0.0)
+        top = max(float(at_G[2]), float(self.nozzle_G[2]))
+        if across > THERE:
+            top = max(top, self.course.staircase.top) + clear
         x, y, _ = self.nozzle_G.tolist()
         places = np.array([[at_G[0], at_G[1], top], [x, y, top], self.nozzle_G])
         moved = np.abs(np.diff(np.vstack((at_G, places)), axis=0)).max(axis=1) > THERE

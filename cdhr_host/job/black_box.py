@@ -41,6 +41,8 @@ class BlackBox:
         self._rows = 0
         self._events: deque[dict[str, Any]] = deque(maxlen=EVENTS)
         self._tick = -1
+        self.line = 0
+        """of the program, executed last; lifts and typed moves have none"""
 
     def executed(self, rows: Setpoints, feedback: Feedback) -> None:
         """N >= 1 executed rows, and what was measured at each."""
@@ -57,8 +59,7 @@ class BlackBox:
     @property
     def lines(self) -> range:
         """Numbers of the last lines of G-code up to the one being executed."""
-        last = int(self._batches[-1][0].line[-1]) if self._batches else 0
-        return range(max(last - LINES + 1, 1), last + 1)
+        return range(max(self.line - LINES + 1, 1), self.line + 1)
 
     def write(self, path: Path, why: Problem, program: str, lines: Iterable[str]) -> None:
         """Keep it all; ``lines`` are the texts of ``self.lines``. Raises JobError when it cannot."""

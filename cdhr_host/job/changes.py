@@ -116,7 +116,11 @@ class Changes:
 
     def _over(self, first: int) -> bool:
         """Whether nothing follows from a tick on but standing."""
-        return self._feeder.standing and first >= self._feeder.next_tick
+        if self._feeder.standing and first >= self._feeder.next_tick:
+            return True
+        course, u, _ = self._playing().beat(first)
+        stop = course.stop()
+        return stop is not None and math.floor(u) >= stop.tick
 
     def _flowing(self, first: int, share: float) -> None:
         score, feeder = self._playing(), self._feeder

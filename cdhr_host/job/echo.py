@@ -4,6 +4,8 @@ from typing import Final
 
 import numpy as np
 
+from cdhr_host.drives.link import MachineLink
+from cdhr_host.drives.rows import RowQueue
 from cdhr_host.errors import DriveError, Problem
 from cdhr_host.units import MM
 from cdhr_host.values import Feedback, Setpoints
@@ -30,3 +32,14 @@ def check_echo(rows: Setpoints, feedback: Feedback, resolution: float) -> None:
             hint="the link between host and drives corrupts data: check cables and firmware",
         )
     )
+
+
+def expect_stop(sent: RowQueue, link: MachineLink) -> bool:
+    """Once a link stops by itself, expect the stop's rows instead of those sent; whether that is so."""
+    if link.stop_tick is None or not len(sent):
+        return False
+    rows = sent.take(len(sent))
+    as_sent = int(np.searchsorted(rows.tick, link.stop_tick))
+    sent.append(rows[:as_sent])
+    sent.append(link.stop_rows(rows[as_sent:]))
+    return True

@@ -8,7 +8,7 @@ import numpy as np
 from cdhr_host.drives.link import LinkState, MachineLink
 from cdhr_host.drives.rows import RowQueue, joined
 from cdhr_host.errors import DriveError, Problem
-from cdhr_host.job.echo import check_echo
+from cdhr_host.job.echo import check_echo, expect_stop
 from cdhr_host.job.making import CHUNK, Making
 from cdhr_host.motion.playback import Pace
 from cdhr_host.motion.ramps import HISTORY
@@ -123,7 +123,7 @@ class Feeder:
     def collect(self) -> list[tuple[Setpoints, Feedback]]:
         """What was executed since the last call, compared with what was fed."""
         feedback = self.link.feedback()
-        self._plan_stop()
+        self._stop_known = self._stop_known or expect_stop(self._sent, self.link)
         if not len(feedback):
             self._check_alive()
             return []
@@ -181,17 +181,6 @@ class Feeder:
         if self.score is None or self._tick is None:
             return None
         return self.score.beat(self._tick)
-
-    def _plan_stop(self) -> None:
-        """Once the link stops by itself, expect the stop's rows instead of those fed for these ticks."""
-        tick = self.link.stop_tick
-        if tick is None or self._stop_known or not len(self._sent):
-            return
-        self._stop_known = True
-        rows = self._sent.take(len(self._sent))
-        as_sent = int(np.searchsorted(rows.tick, tick))
-        self._sent.append(rows[:as_sent])
-        self._sent.append(self.link.stop_rows(rows[as_sent:]))
 
     def _forget(self, tick: int) -> None:
         """Let go of what lies well before an executed tick."""

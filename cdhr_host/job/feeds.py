@@ -77,7 +77,7 @@ class Feeds:
         if base is None or score is None:
             return
         ready = self._feeder.settled and self._feeder.next_tick >= self._next_try
-        if moving and ready and not self._right() and not self._joined():
+        if moving and ready and not self.right and not self._joined():
             self._next_try = self._feeder.next_tick + round(AGAIN / self._feeder.period)
         self._push_more()
         self._follow(base)
@@ -106,7 +106,7 @@ class Feeds:
     def choose_at_rest(self) -> None:
         """Before going on from rest: the right course at the same place."""
         feeder, score = self._feeder, self._feeder.score
-        if score is None or feeder.making is None or self._right() or feeder.stop is not None:
+        if score is None or feeder.making is None or self.right or feeder.stop is not None:
             return
         begin = feeder.next_tick - 1
         part = score.last
@@ -118,7 +118,8 @@ class Feeds:
         other.drop(int(u) - KEPT)
         feeder.making.score = score.with_part(Part(begin, other, Pace.of(tick=begin, u=u, rate=0.0)))
 
-    def _right(self) -> bool:
+    @property
+    def right(self) -> bool:
         """Whether the course that is played is the one for the feed wanted."""
         score = self._feeder.score
         if score is None:
@@ -131,7 +132,7 @@ class Feeds:
     def _joined(self) -> bool:
         """Join the right course soon; whether that was possible, or is the case already."""
         feeder, score = self._feeder, self._feeder.score
-        if score is None or feeder.standing or self._right():
+        if score is None or feeder.standing or self.right:
             return False
         first = feeder.changeable
         part, soonest = score.part_at(first), first + round(self._changes.lead / feeder.period)

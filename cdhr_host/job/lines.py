@@ -32,6 +32,8 @@ class Lines:
         self._telling = telling
         self._happened = happened
         self._stream: LineStream | None = None
+        self._from = 0
+        """the first tick of it"""
         self._reserve = rows_needed(player.profile)
         self._lead = self._reserve + round(LEAD * self._speed / player.profile.drives.period)
 
@@ -47,10 +49,7 @@ class Lines:
 
     def progress(self) -> Progress | None:
         """Of the stream."""
-        last = self._player.feeder.last
-        return (
-            None if self._stream is None else self._stream.progress(0 if last is None else int(last.line[-1]))
-        )
+        return None if self._stream is None else self._stream.progress(self._line())
 
     def hasten(self, feed: float) -> None:
         """Lines read from now on have this feed where it is above 100 %."""
@@ -119,6 +118,7 @@ class Lines:
         planned = course.staircase.tick - course.first
         if planned > 0 and (planned >= self._lead or course.hurried):
             self._player.lines(course)
+            self._from = self._player.feeder.next_tick
         elif not course.rests and course.hurried:
             course.rest()
         elif course.rests and (stream.over or stream.refusal is not None):
@@ -164,5 +164,7 @@ class Lines:
         return link.state is LinkState.RUNNING and link.buffered < self._reserve + spare
 
     def _line(self) -> int:
+        """The line being executed; rows from before this stream have lines of their own."""
         last = self._player.feeder.last
-        return 0 if last is None or not self._player.busy else int(last.line[-1])
+        here = last is not None and self._player.busy and int(last.tick[-1]) >= self._from
+        return int(last.line[-1]) if last is not None and here else 0

@@ -219,7 +219,8 @@ class Printer:
         self._wake.set()
         if self._thread is not None:
             self._thread.join()
-        self._acts.end()
+        self._acts.end(self._state)
+        self._telling.tell(self.status)
         self._executor.shutdown(wait=False, cancel_futures=True)
 
     def turn(self) -> None:

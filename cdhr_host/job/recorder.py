@@ -13,7 +13,16 @@ from typing import Final
 from cdhr_host.drives.link import MachineLink
 from cdhr_host.errors import Problem
 from cdhr_host.job.black_box import SUFFIX, BlackBox
-from cdhr_host.job.journal import Executed, Fed, JournalWriter, Opened, Turned, journal_folder, prune
+from cdhr_host.job.journal import (
+    Executed,
+    Fed,
+    JournalWriter,
+    Opened,
+    Turned,
+    boot_name,
+    journal_folder,
+    prune,
+)
 from cdhr_host.job.journal.records import VERSION
 from cdhr_host.job.journal.writing import SUFFIX as JOURNAL
 from cdhr_host.job.program import ProgramFile
@@ -33,6 +42,8 @@ class Plan:
 
     executed: float
     fed: float
+    pace: float = 0.0
+    """ticks of it in one of the drives', at most until then; 0 where it does not change"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +92,7 @@ class Recorder:
             begun=now.isoformat(timespec="seconds"),
             goes_on=goes_on,
             first_tick=tick,
+            boot=boot_name(),
         )
         self._journal = JournalWriter(self._folder / f"{stem}{JOURNAL}", opened)
         self._dogs = Watchdogs(self._link.profile)
@@ -89,11 +101,13 @@ class Recorder:
     def executed(self, rows: Setpoints, feedback: Feedback, plan: Plan | None) -> Alarm | None:
         """A batch that was executed, with a ``plan`` while a program is played; the first thing wrong."""
         self._box.executed(rows, feedback)
+        if plan is not None:
+            self._box.line = int(rows.line[-1])
         if self._journal is not None and plan is not None:
             self._extruded += float(rows.flow.sum()) * self._link.profile.drives.period
             x, y, z = (rows.nozzle_G[-1] / MM).tolist()
             counts = tuple(feedback.counts[-1].tolist())
-            self._journal.add(Fed(int(rows.line[-1]), round(plan.fed, 6)))
+            self.expect(int(rows.line[-1]), plan)
             self._journal.add(
                 Executed(
                     tick=int(rows.tick[-1]),
@@ -107,6 +121,11 @@ class Recorder:
             )
         return self._dogs.executed(rows, feedback)
 
+    def expect(self, line: int, plan: Plan) -> None:
+        """How far the drives may get, and how fast: to be written before they are fed that."""
+        if self._journal is not None:
+            self._journal.add(Fed(line, round(plan.fed, 6), plan.pace))
+
     def look(self, now: float, fed: int, *, waiting: bool) -> Alarm | None:
         """Clocks, feeder and disk, about once a second; the first thing wrong."""
         if self._journal is None or now - self._looked < LOOK:
@@ -117,6 +136,10 @@ class Recorder:
             or self._dogs.fed(now, fed, waiting=waiting)
             or self._dogs.disk(shutil.disk_usage(self._folder).free)
         )
+
+    def rearm(self) -> None:
+        """An operator has seen to the machine: what was found amiss before counts no more."""
+        self._dogs = Watchdogs(self._link.profile)
 
     def event(self, kind: str, text: str) -> None:
         """Something happened."""

@@ -27,6 +27,7 @@ class Records:
 
     def begin(self, file: ProgramFile, *, goes_on: str = "", tick: float = 0.0) -> None:
         """A print begins. Raises JobError where no journal can be written."""
+        self._kept = False
         if self._recorder is not None:
             self._recorder.begin(file, goes_on=goes_on, tick=tick)
 
@@ -38,6 +39,13 @@ class Records:
         feeder = self._player.feeder
         waiting = feeder.link.free > 0 and not feeder.standing
         return found or self._recorder.look(now, feeder.next_tick, waiting=waiting)
+
+    def hasten(self, feed: float) -> None:
+        """The program is about to be played at another feed: a crash must find that written."""
+        plan, last = self._plan(), self._player.feeder.last
+        if self._recorder is not None and plan is not None and last is not None:
+            fed = plan.executed + (plan.fed - plan.executed) * max(feed, 1.0)
+            self._recorder.expect(int(last.line[-1]), Plan(plan.executed, fed, feed))
 
     def keep(self, why: Problem) -> None:
         """Write the black box, once until ``acknowledged``."""
@@ -52,8 +60,10 @@ class Records:
         self._telling.add("message", f"the last minute is in {path}: cdhr plot draws it")
 
     def acknowledged(self) -> None:
-        """The next fault has a black box of its own."""
-        self._kept = False
+        """The next fault has a black box of its own; what was found before is over."""
+        self._kept, self._alarm = False, None
+        if self._recorder is not None:
+            self._recorder.rearm()
 
     def end(self) -> None:
         """Nothing more will be recorded."""
@@ -72,7 +82,8 @@ class Records:
         if stopped or player.kind is not Kind.PROGRAM or (now := player.feeds.plan_time()) is None:
             return None
         held = player.link.free + player.feeder.buffered
-        return Plan(now, now + held * max(player.feed, 1.0))
+        steady = player.feeder.settled and player.feeds.right
+        return Plan(now, now + held * max(player.feed, 1.0), 0.0 if steady else player.feed)
 
     def _heard(self, event: Event) -> None:
         assert self._recorder is not None

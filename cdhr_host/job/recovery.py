@@ -16,7 +16,7 @@ import numpy as np
 
 from cdhr_host.errors import JobError, Problem
 from cdhr_host.job.aside import Aside
-from cdhr_host.job.journal import Executed, Journal
+from cdhr_host.job.journal import SYNC_EVERY, Executed, Journal, boot_name
 from cdhr_host.job.making import Making
 from cdhr_host.job.program import Program
 from cdhr_host.motion.hold import rows_needed
@@ -35,6 +35,10 @@ SAME: Final = 0.02 * MM
 """how far the journal's nozzle may be from the plan's"""
 NEAR: Final = 0.3 * MM
 """how far the nozzle may stand from the path and still count as on it"""
+FINE: Final = 0.5
+"""ticks between places at which the nozzle is looked for"""
+BEGUN: Final = 2.0
+"""ticks by which a link's own stop may have begun later than is found: both its ends are rounded to rows"""
 BACK: Final = 60.0
 """s of plan looked back over for the overlap"""
 Stops = Callable[[Setpoints], Setpoints]
@@ -141,8 +145,12 @@ class Resuming:
         last = journal.executed
         assert last is not None
         fed = max(journal.fed.plan_tick if journal.fed else last.plan_tick, last.plan_tick)
+        if journal.state != "held" and (journal.damage is not None or _cut(journal)):
+            fed += SYNC_EVERY / self._period * max(journal.pace, 1.0)  # records that the disk never had
         course = self._course(max(last.plan_tick - BACK / self._period, 0.0))
         course.plan(math.ceil(fed) + 1)
+        while (stop := course.stop()) is not None and stop.tick <= last.plan_tick:
+            course.passed()
         self._check_plan(course, last)
         return last, fed, course
 
@@ -155,7 +163,7 @@ class Resuming:
         rested = rested if stop is None else min(rested, stop.tick - 1.0)
         tick = self._before(course, bead, overlap)
         line, place = self._line(course, tick), self._place(course, tick)
-        twice = self._length(course, tick, bead if sure else rested) + away
+        twice = self._length(course, tick, min(bead + BEGUN, rested) if sure else rested) + away
         return Recovery(tick, line, place, bead, rested, twice, away, sure)
 
     def _check_plan(self, course: Course, last: Executed) -> None:
@@ -173,33 +181,42 @@ class Resuming:
     ) -> tuple[float, float, float, bool]:
         """Ticks at which the bead ended and the nozzle rests, m from the path, and whether that is sure."""
         last, fed = known
-        tick, rows = self._rows(course, last.plan_tick, fed, journal.pace)
-        away = np.linalg.norm(rows.nozzle_G - measured_G, axis=1)
-        nearest = int(away.argmin())
-        distance, rested = float(away[nearest]), max(float(tick[nearest]), last.plan_tick)
-        if distance > NEAR:
+        reach = fed + rows_needed(self._rig.profile) * max(journal.pace_most, 1.0)
+        end = max(float(self._end(course, reach)), last.plan_tick)
+        tick = np.append(np.arange(last.plan_tick, end, FINE), end)
+        away = np.linalg.norm(course.nozzle(tick).position_G - measured_G, axis=1)
+        if away.min() > NEAR:
+            found, limit = away.min() / MM, NEAR / MM
             raise _refusal(
-                f"the nozzle stands {distance / MM:.2f} mm from the path it was on (limit {NEAR / MM:g} mm)",
+                f"the nozzle stands {found:.2f} mm from the path it was on (limit {limit:g} mm)",
                 "if it was moved since, say --moved; if not, reference the machine",
             )
-        if journal.state == "held":
-            return last.plan_tick, last.plan_tick, distance, True
-        begin = _stop_begin(rows, nearest, stops)
-        if begin is None:
-            return last.plan_tick, rested, distance, False
-        return max(float(tick[begin]), last.plan_tick), rested, distance, True
+        first, latest = _rested(away)
+        if journal.state == "held" and tick[first] - last.plan_tick < 1.0:
+            return last.plan_tick, last.plan_tick, float(away[first]), True
+        begins = [
+            self._stop_begin(course, (last.plan_tick, reach), float(tick[first]), pace, stops)
+            for pace in sorted({journal.pace, journal.pace_most})
+        ]  # any other stop is shorter, and so is one from less speed: clay ended there or later
+        bead = min(last.plan_tick if begin is None else begin for begin in begins)
+        as_links_do = journal.state != "fault" and not _cut(journal)
+        sure = begins[0] is not None and len(begins) == 1 and first == latest and as_links_do
+        return max(bead, last.plan_tick), float(tick[latest]), float(away[first]), sure
 
-    def _rows(self, course: Course, first: float, last: float, pace: float) -> tuple[Array, Setpoints]:
-        """(N,) ticks of the plan as they were played at a pace, and the rows at them.
-
-        Over what may have been executed, and what a stop may still have played.
-        """
-        end = math.ceil(last + rows_needed(self._rig.profile) * max(pace, 1.0))
-        course.plan(end + 1)
+    def _end(self, course: Course, tick: float) -> int:
+        """A tick, or that of the plan's next stop where it is earlier; the plan is made up to there."""
+        course.plan(math.ceil(tick) + 1)
         stop = course.stop()
-        rows = course.rows(math.floor(first), end if stop is None else min(end, stop.tick))
+        return math.ceil(tick) if stop is None else min(math.ceil(tick), stop.tick)
+
+    def _stop_begin(
+        self, course: Course, reach: tuple[float, float], rested: float, pace: float, stops: Stops
+    ) -> float | None:
+        """Tick from which a link's own stop, at a pace of playback, ends at another; None where none does."""
+        rows = course.rows(math.floor(reach[0]), self._end(course, reach[1]))
         tick = np.arange(float(rows.tick[0]), float(rows.tick[-1]), pace)
-        return tick, _between(rows, tick)
+        begin = _stop_begin(_between(rows, tick), int(np.abs(tick - rested).argmin()), stops)
+        return None if begin is None else float(tick[begin])
 
     def _before(self, course: Course, tick: float, way: float) -> float:
         """The tick this much path before another; that of the last rest at the most."""
@@ -222,6 +239,19 @@ class Resuming:
 
     def _line(self, course: Course, tick: float) -> int:
         return int(course.nozzle(np.array([tick])).line[0])
+
+
+def _cut(journal: Journal) -> bool:
+    """Whether the power was cut: the disk may lack records, and the drives stopped as their brakes do."""
+    return journal.power_was_cut(boot_name())
+
+
+def _rested(away: Array) -> tuple[int, int]:
+    """(N,) m from a path's rows -> the rows nearest the first and the last time that it comes NEAR."""
+    near = np.flatnonzero(away <= NEAR)
+    visits = np.split(near, np.flatnonzero(np.diff(near) > 1) + 1)
+    first, latest = (visit[away[visit].argmin()] for visit in (visits[0], visits[-1]))
+    return int(first), int(latest)
 
 
 def _between(rows: Setpoints, tick: Array) -> Setpoints:

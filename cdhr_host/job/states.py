@@ -1,4 +1,4 @@
-"""The states of a job and what leads from one to another: one table, drawn in docs/job.md."""
+"""The states of a job and what leads from one to another: one table, printed in docs/job.md."""
 
 from enum import Enum
 from typing import Final
@@ -102,16 +102,15 @@ def can(state: S, word: Word) -> bool:
     return (state, word) in TABLE
 
 
-def diagram() -> str:
-    """The table as a mermaid state diagram; words that lead to the same state share an arrow."""
-    arrows: dict[tuple[S, S], list[str]] = {}
+def drawn() -> str:
+    """The table in Markdown, for docs/job.md; words that lead to the same state share an arrow."""
+    arrows: dict[S, dict[S, list[str]]] = {state: {} for state in S}
     for (state, word), target in TABLE.items():
-        if word is not Word.FAIL:
-            arrows.setdefault((state, target), []).append(word.value)
-    lines = ["stateDiagram-v2", "    [*] --> idle"]
-    lines += [
-        f"    {state.value} --> {target.value}: {', '.join(words)}"
-        for (state, target), words in arrows.items()
-        if state is not target
-    ]
-    return "\n".join([*lines, "    note right of fault: from every state"])
+        if word is not Word.FAIL and state is not target:
+            arrows[state].setdefault(target, []).append(word.value)
+    ways = (
+        [f"{', '.join(words)} → **{target.value}**" for target, words in each.items()]
+        for each in arrows.values()
+    )
+    rows = (f"| {state.value} | {' · '.join(way)} |" for state, way in zip(arrows, ways, strict=True))
+    return "\n".join(["| state | what leads from it |", "|---|---|", *rows])

@@ -9,7 +9,7 @@ from cdhr_host.drives.clock import Clock
 from cdhr_host.drives.link import LinkState, MachineLink
 from cdhr_host.drives.rows import RowQueue
 from cdhr_host.errors import DriveError, JobError, Problem
-from cdhr_host.job.echo import check_echo
+from cdhr_host.job.echo import check_echo, expect_stop
 from cdhr_host.job.tally import RunSummary, Tally
 from cdhr_host.job.waiting import wait_for_credit
 from cdhr_host.motion.hold import ends_at_rest
@@ -130,7 +130,7 @@ class Streamer:
     def _collect(self) -> None:
         """Take what was executed, compare it with what was sent, hand it on."""
         feedback = self._link.feedback()
-        self._plan_stop()
+        self._stop_known = self._stop_known or expect_stop(self._sent, self._link)
         if not len(feedback):
             return
         if len(feedback) > len(self._sent):
@@ -139,17 +139,6 @@ class Streamer:
         check_echo(rows, feedback, self._link.resolution)
         self._tally.add(rows, feedback)
         self._on_rows(rows, feedback)
-
-    def _plan_stop(self) -> None:
-        """Once the link stops, expect the stop's rows instead of those sent for these ticks."""
-        tick = self._link.stop_tick
-        if tick is None or self._stop_known or not len(self._sent):
-            return
-        self._stop_known = True
-        rows = self._sent.take(len(self._sent))
-        as_sent = int(np.searchsorted(rows.tick, tick))
-        self._sent.append(rows[:as_sent])
-        self._sent.append(self._link.stop_rows(rows[as_sent:]))
 
     def _bring_to_rest(self) -> None:
         """Stop; further errors on the way give way to the one that is being raised."""

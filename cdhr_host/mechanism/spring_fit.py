@@ -56,24 +56,28 @@ class _Fit:
         aside = self.level.shape[2]
         return np.hstack((self.level @ coefficients[:aside], self.upright @ coefficients[aside:]))
 
-    def worst(self, coefficients: Array, sharpness: float) -> tuple[float, Array, Array]:
-        """The sum, and each pose's slope (N, 3) and curvature (N, 3, 3) by its spring force."""
-        half = 0.5 * (self.windows.high - self.windows.low)
-        rise = self.response.gain / half[:, None]
-        slopes = np.concatenate([rise, -rise], axis=1)
+    def worst(self, coefficients: Array, sharpness: float) -> tuple[float, Array]:
+        """The sum, and the share (N, 24) that each margin has in its pose's."""
         margin = self.windows.margins(self.response.force(self.spring(coefficients)))
         least = margin.min(axis=1, keepdims=True)
         share = np.exp(-sharpness * (margin - least))
         total = share.sum(axis=1, keepdims=True)
-        share /= total
         value = self.weight @ (np.log(total[:, 0]) / sharpness - least[:, 0])
+        return float(value), share / total
+
+    def bent(self, share: Array, sharpness: float) -> tuple[Array, Array]:
+        """Each pose's slope (N, 3) and curvature (N, 3, 3) by its spring force, from the shares."""
+        half = 0.5 * (self.windows.high - self.windows.low)
+        rise = self.response.gain / half[:, None]
+        slopes = np.concatenate([rise, -rise], axis=1)
         slope = -np.einsum("ni,nij->nj", share, slopes)
         curve = (share[:, :, None] * slopes).transpose(0, 2, 1) @ slopes
-        return float(value), slope, sharpness * (curve - slope[:, :, None] * slope[:, None, :])
+        return slope, sharpness * (curve - slope[:, :, None] * slope[:, None, :])
 
     def step(self, coefficients: Array, sharpness: float) -> Array:
         """One damped Newton step; the same coefficients where none gets better."""
-        value, slope, curve = self.worst(coefficients, sharpness)
+        value, share = self.worst(coefficients, sharpness)
+        slope, curve = self.bent(share, sharpness)
         gradient = self._gathered(self.weight[:, None] * slope)
         hessian = self._hessian(self.weight[:, None, None] * (curve + 1e-7 * np.eye(3)))
         scale = float(np.diag(hessian).mean()) * np.eye(len(coefficients))

@@ -47,7 +47,8 @@ class Parking:
 
     def __init__(self, profile: Profile) -> None:
         self._profile = profile
-        self._top = -math.inf
+        self.top = -math.inf
+        """m, of the clay laid so far"""
         self._back: Moves | None = None
 
     @property
@@ -58,7 +59,7 @@ class Parking:
     def note(self, command: Command) -> None:
         """What a command lays is what must be cleared from now on."""
         if lays(command):
-            self._top = max(self._top, _highest(command))
+            self.top = max(self.top, _highest(command))
 
     def leave(self, at_G: Array, line: int) -> Moves | None:
         """The way there from (3,) m; None where the profile wants none, or the nozzle is away already."""
@@ -68,7 +69,7 @@ class Parking:
         x, y, z = at_G.tolist()
         places = [at_G, np.array([x, y, z + job.lift])]
         if job.pauses_park:
-            top = max(z, self._top) + job.lift
+            top = max(z, self.top) + job.lift
             places = [at_G, np.array([x, y, top]), np.array([job.park_x, job.park_y, top])]
         self._back = _travel(places[::-1], self._profile, line)
         return _travel(places, self._profile, line)

@@ -239,6 +239,11 @@ class Staircase:
         return self._planner.standing.at_G
 
     @property
+    def top(self) -> float:
+        """m, the top of all clay laid by what is settled; minus infinity where there is none."""
+        return self._parking.top
+
+    @property
     def upper(self) -> Array:
         """(3,) m, where the upper platform stands then."""
         return self._planner.standing.at_G - self.rig.cables.reference_G + self._offset

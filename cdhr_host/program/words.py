@@ -163,12 +163,18 @@ def unknown(code: str, line: int, column: int) -> Problem:
     return Problem("word", f"{kind} word {code}", line, column, value=code, hint=hint)
 
 
+def _edits(one: str, other: str) -> int:
+    """Letters to be put in, taken out or replaced."""
+    steps = difflib.SequenceMatcher(None, one, other).get_opcodes()
+    return sum(max(i1 - i0, j1 - j0) for what, i0, i1, j0, j1 in steps if what != "equal")
+
+
 def nearest(code: str) -> str:
     """The known word most like this one, by letter, then by spelling, then by number."""
     number = float(code[1:] or 0)
 
-    def unlike(known: str) -> tuple[bool, float, float]:
+    def unlike(known: str) -> tuple[bool, float, int, float]:
         alike = difflib.SequenceMatcher(None, known[1:].zfill(4), code[1:].zfill(4)).ratio()
-        return known[0] != code[0], -alike, abs(float(known[1:]) - number)
+        return known[0] != code[0], -alike, _edits(known, code), abs(float(known[1:]) - number)
 
     return min(WORDS, key=unlike)

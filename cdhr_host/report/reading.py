@@ -117,6 +117,9 @@ def _parquet(path: Path) -> dict[str, Any]:
 
 def _black_box(path: Path) -> dict[str, Any]:
     columns, meta = read_black_box(path)
+    if not columns:
+        why = meta["why"]["message"]
+        raise LogFileError(f"nothing was executed before this black box was written: {why}")
     t = np.asarray(columns.get("t_s", np.zeros(0)), dtype=np.float64)
     return {
         "names": tuple(columns),

@@ -46,7 +46,11 @@ class Folder:
     """Programs below one root; raises JobError for what is not allowed, with the reason."""
 
     def __init__(self, root: Path, limits: FolderLimits | None = None) -> None:
-        root.mkdir(parents=True, exist_ok=True, mode=0o750)
+        try:
+            root.mkdir(parents=True, exist_ok=True, mode=0o750)
+        except OSError as error:
+            message = f"{root} cannot be the folder of programs: {error.strerror}"
+            raise refused(message, "name another with --files", kind="folder") from error
         self.root = root.resolve()
         self.limits = limits or FolderLimits()
         for left in self.root.glob(".upload-*"):

@@ -13,6 +13,7 @@ from typer.testing import CliRunner, Result
 from cdhr_host.cli import printing
 from cdhr_host.cli.app import app
 from cdhr_host.drives import Loopback
+from cdhr_host.job.printer import Printer
 from cdhr_host.pipeline.columns import SETPOINT_COLUMNS
 from cdhr_host.units import MM
 from cdhr_host.values import Feedback
@@ -75,21 +76,17 @@ def test_a_run_as_json() -> None:
 
 
 def interrupt_at(monkeypatch: pytest.MonkeyPatch, line: int, times: int = 1) -> None:
-    """Ctrl-C as soon as a row of this line was executed."""
-    original = printing._shown
+    """Ctrl-C as soon as this line is executed."""
+    original, left = printing._show, [times]
 
-    def shown(run: Any, progress: Any) -> Any:
-        show, left = original(run, progress), [times]
+    def shown(printer: Printer, progress: Any, speed: float) -> None:
+        original(printer, progress, speed)
+        done = printer.status().progress
+        if done is not None and done.line >= line and left[0]:
+            left[0] -= 1
+            signal.raise_signal(signal.SIGINT)
 
-        def pressed(rows: Any) -> None:
-            show(rows)
-            if int(rows.line[-1]) >= line and left[0]:
-                left[0] -= 1
-                signal.raise_signal(signal.SIGINT)
-
-        return pressed
-
-    monkeypatch.setattr(printing, "_shown", shown)
+    monkeypatch.setattr(printing, "_show", shown)
 
 
 @pytest.mark.parametrize("times", [1, 2])
@@ -133,6 +130,7 @@ def test_a_following_error_stops_the_run_and_keeps_its_log(
     result = cdhr("stream", RING, "--profile", str(profile), "--log", str(log), *FAST)
     assert result.exit_code == 6
     assert re_line(result.stderr, RING, "mm away from its setpoint")
+    assert "the last minute is in " in result.stderr
     table = pq.read_table(log)
     assert 0 < table.num_rows < 13000
     assert table["pressure_kpa"].to_numpy()[-1] == 0

@@ -1,6 +1,7 @@
 """The sender's process: rings, commands, and what happens when a process dies. Real terminals."""
 
 import json
+import multiprocessing
 import os
 import select
 import signal
@@ -8,6 +9,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager, suppress
+from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +19,9 @@ from trajectories import PAPER, changed, run_of
 from cdhr_host.drives import LinkState, MonotonicClock
 from cdhr_host.drives.rows import joined
 from cdhr_host.drives.sender import SenderLink
-from cdhr_host.drives.sender.far import CAPACITY
+from cdhr_host.drives.sender.far import CAPACITY, RESULTS, REVISION, Sender, Spec, Word, timing_told
 from cdhr_host.drives.sender.ring import FEEDBACK, SETPOINTS, Ring, feedback, packed, setpoints, width
+from cdhr_host.drives.timing import CycleTiming
 from cdhr_host.errors import DriveError, Problem
 from cdhr_host.job import stream
 from cdhr_host.motion.hold import path_true_stop
@@ -76,6 +79,52 @@ def _until(done, patience=20.0):
             return
         select.select([], [], [], 0.02)
     raise AssertionError("it never came")
+
+
+def timing(worst, *, real_time=True):
+    return CycleTiming(500, 1e-4, 2e-4, worst, worst, 0, 0, real_time)
+
+
+@pytest.mark.parametrize(
+    ("soft", "worst", "said"),
+    [
+        (False, 1.9e-3, "timing test: p99.9 1.900 ms, worst 1.900 ms late"),
+        (False, 2.1e-3, "failed (limit 2 ms), nothing is armed"),
+        (True, 2.1e-3, "failed (limit 2 ms), the drives may stand still for moments"),
+    ],
+)
+def test_timing_test_is_told(soft, worst, said):
+    profile = PAPER.model_copy(
+        update={"canopen": PAPER.canopen.model_copy(update={"allow_soft_realtime": soft})}
+    )
+    assert timing_told(timing(worst), profile).endswith(said)
+    assert "without real-time priority" in timing_told(timing(worst, real_time=False), profile)
+
+
+@pytest.mark.parametrize("soft", [False, True])
+def test_sender_that_failed_its_timing_test_arms_only_where_that_is_allowed(tmp_path, soft):
+    settings = PAPER.canopen.model_copy(update={"allow_soft_realtime": soft})
+    profile = PAPER.model_copy(update={"canopen": settings})
+    sizes = (
+        (SETPOINTS, Setpoints, CAPACITY),
+        (FEEDBACK, Feedback, RESULTS),
+        (SETPOINTS, Setpoints, REVISION),
+    )
+    rings = [Ring(width(columns, kind), capacity) for columns, kind, capacity in sizes]
+    memory = SharedMemory(create=True, size=8 * len(Word))
+    commands, far = multiprocessing.Pipe()
+    spec = Spec(
+        "virtual:cdhr-test", profile, tmp_path / "r.json", *(ring.name for ring in rings), memory.name
+    )
+    sender = Sender(spec, far)
+    sender._punctual = False
+    with pytest.raises(DriveError) as caught:
+        sender._do_arm([0.0] * 6)
+    assert caught.value.problems[0].kind == ("state" if soft else "jitter")
+    sender.end()
+    memory.unlink()
+    for each in (*rings, commands, far, memory):
+        each.close()
 
 
 def test_rows_survive_the_ring():

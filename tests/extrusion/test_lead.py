@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from cdhr_host.extrusion import AirModel, AirStage, Channel, ChannelFlow, LinearFlow, Material
@@ -155,8 +155,12 @@ def test_commands_do_not_depend_on_the_batches(model, flow, sizes):
     assert (whole <= model.pressure_max).all()
 
 
+SHUTS_EARLY = AirModel(LinearFlow(60e3, 3.5e11), 200e3, 0.08, 0.0, 0.0, 0.05, 0.0, 0.0)
+
+
 @settings(max_examples=60, deadline=None)
 @given(models, flows, st.floats(0.0, 1.0), st.integers(0, 300))
+@example(SHUTS_EARLY, np.repeat([0.0, 4e-8, 0.0], [2, 56, 100]), 0.375, 99)
 def test_the_same_rows_again_give_the_same_commands(model, flow, share, ahead):
     whole, expected = rows(flow), led(model, flow)
     again = int(share * (len(flow) - 1))

@@ -16,7 +16,7 @@ from looking import ROOT
 DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
 BLOCK = re.compile(r"^```console\n(.*?)^```", re.DOTALL | re.MULTILINE)
-SHOWN = re.compile(r"^```(?!python|mermaid)\w*\n(.*?)^```|^((?: {4}.*\n)+)", re.DOTALL | re.MULTILINE)
+SHOWN = re.compile(r"^```(?!python)\w*\n(.*?)^```|^((?: {4}.*\n)+)", re.DOTALL | re.MULTILINE)
 """every block that is not Python"""
 COMMAND = re.compile(r"(?:\$ )?((?:cdhr|dask|curl|python3?|pip|prusa-slicer|CuraEngine|xset|systemctl) .*)")
 LONG = "minutes of CPU: tests/report/test_reproduce.py tries its items"

@@ -33,6 +33,7 @@ def filled(seconds: float) -> tuple[BlackBox, list[tuple[Setpoints, Feedback]]]:
     for first in range(0, round(seconds / PERIOD), 50):
         kept.append(batch(first, 50))
         box.executed(*kept[-1])
+        box.line = int(kept[-1][0].line[-1])
     return box, kept
 
 

@@ -104,12 +104,18 @@ def test_a_long_even_bead_has_no_stop_in_it() -> None:
 def test_a_pause_before_which_all_was_sent_is_resumed_and_held_again() -> None:
     bench = Bench()
     bench.send("G1 X10 F1800", "M0 more clay")
+    bench.until(lambda: bench.state is JobState.HELD)
+    bench.printer.resume()
+    bench.printer.hold()
     for _ in range(2):
         bench.until(lambda: bench.state is JobState.HELD)
         bench.printer.resume()
         bench.until(lambda: bench.state is JobState.PRINTING)
         bench.turns(20)
         bench.printer.hold()
+    bench.until(lambda: bench.state is JobState.HELD)
+    bench.printer.resume()
+    bench.printer.hold()
     bench.until(lambda: bench.state is JobState.HELD)
     bench.printer.resume()
     bench.send("G1 X20")
@@ -168,6 +174,17 @@ def test_a_line_found_impossible_late_is_named_with_what_to_do(
         bench.printer.resume()
     bench.printer.abort()
     bench.until(lambda: bench.state is JobState.STOPPED)
+
+
+def test_lines_of_a_second_stream_are_pending_until_they_are_executed() -> None:
+    bench = Bench()
+    bench.send(*(f"G1 X{k} F3000" for k in range(1, 30)))
+    bench.feed.finish()
+    bench.until(lambda: bench.state is JobState.DONE)
+    bench.feed = bench.printer.open_stream("a test")
+    bench.send("G1 X0 F600")
+    bench.until(lambda: not bench.feed.pending)
+    assert bench.nozzle()[-1] == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
 
 
 def test_a_slow_bead_has_no_stop_in_it_and_ends_soon_after_its_client_has() -> None:
@@ -281,7 +298,7 @@ def test_a_pause_of_the_program_holds() -> None:
     bench = Bench()
     bench.send("G1 X10 F1800", "M0 more clay", "G1 X20")
     bench.until(lambda: bench.state is JobState.HELD)
-    assert bench.nozzle()[-1] == pytest.approx([0.0, 0.0, 0.02], abs=1e-6)
+    assert bench.nozzle()[-1] == pytest.approx([0.01, 0.0, 0.0], abs=1e-6)
     bench.printer.resume()
     bench.feed.finish()
     bench.until(lambda: bench.state is JobState.DONE)

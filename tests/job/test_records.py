@@ -141,3 +141,38 @@ def test_an_emergency_stop_leaves_a_black_box(tmp_path: Path, program: Program) 
     assert columns["pressure_kpa"][-1] == 0.0
     steps = np.abs(np.diff(columns["slider1_mm"][-2:]))
     assert steps.max() < 1e-3
+
+
+def test_an_aborted_print_leaves_its_last_minute(tmp_path: Path, program: Program) -> None:
+    bench = Bench(tmp_path, program)
+    bench.run(lambda: bench.clock.now() > 3.0)
+    bench.printer.abort("enough")
+    bench.run(bench.is_(JobState.STOPPED))
+    columns, meta = read_black_box(next(tmp_path.glob("*.npz")))
+    assert meta["why"]["kind"] == "abort"
+    assert len(columns["t_s"]) > 500
+    assert meta["lines"][-1] == {"line": 13, "text": "G3 X0 Y75 I-75 J0 E1314.60791 F1200"}
+
+
+def test_a_print_that_its_host_leaves_has_its_last_minute(tmp_path: Path, program: Program) -> None:
+    bench = Bench(tmp_path, program)
+    bench.run(lambda: bench.clock.now() > 3.0)
+    bench.printer.close()
+    _, meta = read_black_box(next(tmp_path.glob("*.npz")))
+    assert meta["why"]["kind"] == "interrupted"
+
+
+def test_typed_moves_are_watched_too(tmp_path: Path) -> None:
+    clock = Stepped()
+    link = Loopback(PATIENT, clock, disturbance=Stuck(2, 100))
+    link.open()
+    printer = Printer(link, clock, recorder=Recorder(link, Names("paper"), tmp_path))
+    answer = printer.run("G1 X40 F1800")
+    while not answer.done() and printer.state is not JobState.FAULT:
+        printer.turn()
+        clock.wait_until(clock.now() + 0.05)
+    assert printer.state is JobState.FAULT
+    assert printer.fault is not None
+    assert printer.fault.problems[0].kind == "following-error"
+    printer.close()
+    assert next(tmp_path.glob("*.npz"))

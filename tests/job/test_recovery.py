@@ -1,5 +1,6 @@
 """A print that was cut off goes on: everything once, the seam within what is stated, or a reason why not."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,17 +8,18 @@ import pytest
 from stepped import Stepped
 
 from cdhr_host.drives import LinkState, Loopback
+from cdhr_host.drives.rows import joined
 from cdhr_host.errors import JobError
 from cdhr_host.job.journal import Journal, read_journal
 from cdhr_host.job.printer import Printer
 from cdhr_host.job.program import Program, ProgramFile, proven
 from cdhr_host.job.recorder import Names, Recorder
-from cdhr_host.job.recovery import Recovery, Resuming
+from cdhr_host.job.recovery import Recovery, Resuming, _rested
 from cdhr_host.job.surface import JobState
 from cdhr_host.pipeline import Staircase, open_profile
 from cdhr_host.pipeline.rig import Rig
 from cdhr_host.units import MM
-from cdhr_host.values import Feedback, Setpoints
+from cdhr_host.values import Setpoints
 
 PROFILE = open_profile("paper")
 RING = Path(__file__).parents[2] / "gcode" / "paper_ring_double.gcode"
@@ -39,25 +41,31 @@ def whole() -> Setpoints:
     )
 
 
+class Far(Loopback):
+    """A machine that knows what it laid, whether anybody listened or not."""
+
+    def __init__(self, clock: Stepped) -> None:
+        super().__init__(PROFILE, clock)
+        self.laid: list[Setpoints] = []
+
+    def _play(self, rows: Setpoints) -> None:
+        if (rows.flow > 0).any():
+            self.laid.append(rows[rows.flow > 0])
+        super()._play(rows)
+
+
 class Machine:
     """One simulated machine, and the printers that come and go before it."""
 
     def __init__(self, folder: Path) -> None:
         self.clock = Stepped()
-        self.link = Loopback(PROFILE, self.clock)
-        self.folder = folder
-        self.laid: list[Setpoints] = []
+        self.link = Far(self.clock)
+        self.folder, self.laid = folder, self.link.laid
 
     def printer(self) -> Printer:
         """A host process that has just begun."""
         self.link.open()
-        printer = Printer(self.link, self.clock, recorder=Recorder(self.link, Names("paper"), self.folder))
-        printer.observe(self._executed)
-        return printer
-
-    def _executed(self, rows: Setpoints, _: Feedback) -> None:
-        if (rows.flow > 0).any():
-            self.laid.append(rows[rows.flow > 0])
+        return Printer(self.link, self.clock, recorder=Recorder(self.link, Names("paper"), self.folder))
 
     def run(self, printer: Printer, until: float = 1e9) -> JobState:
         """Go on until a time of the clock, or the end."""
@@ -144,12 +152,80 @@ def test_a_killed_print_goes_on(tmp_path: Path, program: Program, whole: Setpoin
     assert machine.journal.finished
 
 
+@pytest.mark.parametrize("feed", [0.3, 1.0, 2.0])
+def test_a_print_killed_while_it_gains_speed_skips_nothing(
+    tmp_path: Path, program: Program, whole: Setpoints, feed: float
+) -> None:
+    """The journal's last pace is not the one that the drives had when they stopped."""
+    machine = Machine(tmp_path)
+    printer = machine.printer()
+    printer.override(feed=feed)
+    printer.adopt(program)
+    printer.start()
+    machine.run(printer, 15.0)
+    printer.hold()
+    while printer.state is not JobState.HELD:
+        machine.run(printer, machine.clock.now() + 0.1)
+    printer.resume()
+    machine.run(printer, machine.clock.now() + 0.06)
+    machine.clock.wait_until(machine.clock.now() + 0.3)
+    machine.killed()
+    recovery = resumed(machine, program)
+    assert not recovery.sure
+    checked(machine, whole, recovery)
+
+
+def test_a_print_killed_soon_after_a_pause_goes_on(tmp_path: Path) -> None:
+    file = tmp_path / "paused.gcode"
+    file.write_text("G1 X40 F1200\nG1 X40 Y20 E60\nM0\nG1 X40 Y-30 E160\nG1 X0 Y0\n")
+    program, machine = proven(ProgramFile(file), PROFILE), Machine(tmp_path)
+    printer = machine.printer()
+    printer.adopt(program)
+    printer.start()
+    while printer.state is not JobState.HELD:
+        machine.run(printer, machine.clock.now() + 0.1)
+    printer.resume()
+    machine.run(printer, machine.clock.now() + 1.5)
+    machine.killed()
+    recovery = resumed(machine, program)
+    assert recovery.line == 4
+    with file.open("rb") as text:
+        rows = list(Staircase(PROFILE).setpoints(iter(lambda: text.read(1 << 16), b"")))
+    checked(machine, joined(rows), recovery)
+
+
 def test_a_held_print_goes_on(tmp_path: Path, program: Program, whole: Setpoints) -> None:
     machine = interrupted(tmp_path, program, 15.0, hold=True)
     recovery = resumed(machine, program)
     assert recovery.sure
     assert recovery.overlap <= OVERLAP + 0.2 * MM
     checked(machine, whole, recovery)
+
+
+def test_after_a_power_cut_the_disk_may_lack_a_second_and_the_drives_stopped_otherwise(
+    tmp_path: Path, program: Program
+) -> None:
+    machine = interrupted(tmp_path, program, 20.0)
+    machine.link.open()
+    way, measured = Resuming(program, RIG), RIG.standing(machine.link.slider)[0]
+    path, lines = machine.journal.path, machine.journal.path.read_bytes().splitlines(keepends=True)
+    true = way.found(machine.journal, measured, machine.link.stop_rows, OVERLAP)
+    lost = [k for k, line in enumerate(lines) if b'["X"' in line][-15]
+    path.write_bytes(b"".join(lines[:lost]))
+    kept = read_journal(path)
+    assert kept.executed is not None
+    assert true.bead - kept.executed.plan_tick > 100
+    again = replace(kept, opened=replace(kept.opened, boot="another start"))
+    found = way.found(again, measured, machine.link.stop_rows, OVERLAP)
+    assert found.bead == pytest.approx(true.bead, abs=2.0)
+    assert not found.sure
+    assert found.overlap >= way.length(found.tick, true.rested) - 1e-9
+    assert way.moved(again, OVERLAP).overlap >= way.length(way.moved(again, OVERLAP).tick, true.rested)
+
+
+def test_a_path_that_comes_by_twice_goes_on_where_it_came_by_first() -> None:
+    away = np.array([9.0, 0.2, 0.1, 0.25, 5.0, 5.0, 0.28, 0.05, 0.2, 7.0]) * MM
+    assert _rested(away) == (2, 7)
 
 
 def test_a_machine_that_was_moved_is_refused(tmp_path: Path, program: Program) -> None:

@@ -27,7 +27,7 @@ TURN = 0.1
 
 
 # No shrinking: a smaller seed draws another program, not a simpler one.
-@settings(max_examples=3, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])
+@settings(max_examples=2, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])
 @given(st.integers(0, 10**9), st.booleans())
 def test_whatever_is_said_the_limits_hold_and_nothing_is_laid_twice(tmp_path_factory, seed, flows):
     rng = np.random.default_rng(seed)

@@ -219,7 +219,7 @@ def test_position_does_not_jump_where_a_leg_is_planned_in_parts(run, limits):
 
 @pytest.mark.parametrize("seed", range(8))
 def test_no_bend_is_crept_through_where_it_ends_at_rest(seed, run):
-    """Corners a little further from a stop than the kernel is wide, or a little nearer, leave room to brake."""
+    """Corners about as far from a stop as the kernel is wide leave room to brake."""
     rng = np.random.default_rng(seed)
     for _ in range(25):
         start = np.round(rng.uniform(-60, 60, 3), 3)

@@ -78,6 +78,13 @@ def test_a_black_box_is_a_log_with_events(paper, tmp_path):
     )
 
 
+def test_a_black_box_of_a_machine_that_did_not_move_says_so(paper, tmp_path):
+    box = tmp_path / "box.npz"
+    BlackBox(paper).write(box, Problem("fault", "no feedback from drive 1"), "part.gcode", [])
+    with pytest.raises(LogFileError, match=r"nothing was executed .*: no feedback from drive 1"):
+        LogFile.opened(box)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [

@@ -60,6 +60,11 @@ class PumpedBridge:
         with self._lock:
             return self._link.slider
 
+    @property
+    def notes(self) -> list[str]:
+        """What an operator should know."""
+        return self._link.notes
+
     def timing(self) -> CycleTiming | None:
         """The bridge keeps time."""
         return self._link.timing()

@@ -17,7 +17,6 @@ from cdhr_host.drives.canopen.machine import CanopenMachine
 from cdhr_host.drives.canopen.setup import CSP, HOMING, IP, set_mode
 from cdhr_host.drives.canopen.verified import read, verified
 from cdhr_host.drives.faults import fault
-from cdhr_host.errors import DriveError
 
 MARK: Final = 0x6081
 """profile velocity: cyclic modes do not use it, and it is lost with the drive's power"""
@@ -86,8 +85,8 @@ def _leave(machine: CanopenMachine, axis: Axis) -> None:
     settings = machine.profile.canopen
     torque = round(machine.profile.drives.torque_max / settings.rated_torque * 1e3)
     for _ in range(3):
-        if any(finding.problems[0].kind != "encoder-jump" for finding in machine.listen()):
-            raise DriveError("homing stopped")
+        if findings := [f for f in machine.listen() if f.problems[0].kind != "encoder-jump"]:
+            raise findings[0]
         machine.hold()
     verified(machine.bus, axis.node, 0x6072, 0, torque)
     set_mode(machine.bus, axis.node, CSP if settings.mode == "csp" else IP)

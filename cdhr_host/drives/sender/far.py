@@ -29,6 +29,7 @@ from cdhr_host.drives.faults import fault
 from cdhr_host.drives.link import LinkState
 from cdhr_host.drives.reference import ReferenceStore
 from cdhr_host.drives.sender.ring import FEEDBACK, SETPOINTS, Ring, packed, setpoints, width
+from cdhr_host.drives.timing import CycleTiming
 from cdhr_host.errors import DriveError, Problem
 from cdhr_host.profile.schema import Profile
 from cdhr_host.values import Feedback, Setpoints
@@ -105,6 +106,22 @@ def hurry() -> bool:
     except PermissionError:
         return False
     return True
+
+
+def timing_told(found: CycleTiming, profile: Profile) -> str:
+    """What the timing test says to an operator."""
+    limit = JITTER * profile.drives.period
+    text = f"timing test: p99.9 {found.p999 * 1e3:.3f} ms, worst {found.max * 1e3:.3f} ms late"
+    if not found.real_time:
+        text += ", without real-time priority"
+    if found.max < limit:
+        return text
+    then = (
+        "the drives may stand still for moments"
+        if profile.canopen.allow_soft_realtime
+        else "nothing is armed"
+    )
+    return f"{text}: failed (limit {limit * 1e3:g} ms), {then}"
 
 
 class Sender:
@@ -195,8 +212,7 @@ class Sender:
             self._link.turn()
         found = lateness.summary()
         self._punctual = found.max < JITTER * self._profile.drives.period
-        test = f"timing test: p99.9 {found.p999 * 1e3:.3f} ms, worst {found.max * 1e3:.3f} ms late"
-        return [*self._link.notes, test + ("" if self._real_time else ", without real-time priority")]
+        return [*self._link.notes, timing_told(found, self._profile)]
 
     def _do_arm(self, start: list[float]) -> None:
         if not self._punctual and not self._profile.canopen.allow_soft_realtime:

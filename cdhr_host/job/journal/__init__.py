@@ -2,9 +2,17 @@
 
 from cdhr_host.job.journal.reading import Damage, Journal, read_journal
 from cdhr_host.job.journal.records import Executed, Fed, Opened, Record, Turned
-from cdhr_host.job.journal.writing import JournalWriter, journal_folder, latest_unfinished, prune
+from cdhr_host.job.journal.writing import (
+    SYNC_EVERY,
+    JournalWriter,
+    boot_name,
+    journal_folder,
+    latest_unfinished,
+    prune,
+)
 
 __all__ = [
+    "SYNC_EVERY",
     "Damage",
     "Executed",
     "Fed",
@@ -13,6 +21,7 @@ __all__ = [
     "Opened",
     "Record",
     "Turned",
+    "boot_name",
     "journal_folder",
     "latest_unfinished",
     "prune",

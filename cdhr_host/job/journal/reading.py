@@ -34,10 +34,16 @@ class Journal:
     """the last with clay being pushed"""
     pace: float
     """ticks of the plan in one of the drives', lately"""
+    pace_most: float
+    """the same for what was fed, at most"""
     state: str
     """the last told"""
     reason: str
     damage: Damage | None
+
+    def power_was_cut(self, boot: str) -> bool:
+        """Whether the computer was started again since; ``boot`` names its present start."""
+        return bool(self.opened.boot) and self.opened.boot != boot
 
     @property
     def finished(self) -> bool:
@@ -123,6 +129,7 @@ class _Reader:
             self._fed,
             self._bead,
             self._pace,
+            max(self._pace, self._fed.pace if self._fed else 0.0),
             self._turned.state,
             self._turned.reason,
             damage,

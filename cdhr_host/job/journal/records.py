@@ -38,6 +38,8 @@ class Opened:
     """the journal this print goes on from; empty for a fresh one"""
     first_tick: float
     """of the program's plan at 100 %, at which it goes on; 0 for a fresh one"""
+    boot: str = ""
+    """names the time since the computer was switched on; empty where it has no such name"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +49,8 @@ class Fed:
     line: int
     plan_tick: float
     """of the program's plan at 100 %"""
+    pace: float = 0.0
+    """ticks of the plan in one of the drives', at most until then; 0 where it stays as it was executed"""
 
 
 @dataclass(frozen=True, slots=True)

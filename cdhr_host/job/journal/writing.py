@@ -19,8 +19,17 @@ from cdhr_host.job.journal.records import Opened, Record, Turned, encoded
 SYNC_EVERY: Final = 1.0
 """s"""
 SUFFIX: Final = ".journal"
+BOOT: Final = Path("/proc/sys/kernel/random/boot_id")
 KEPT: Final = 100
 """journals"""
+
+
+def boot_name() -> str:
+    """Another one after each start of the computer (random(4)); empty where there is none."""
+    try:
+        return BOOT.read_text(encoding="ascii").strip()
+    except OSError:
+        return ""
 
 
 def journal_folder() -> Path:

@@ -3,6 +3,7 @@
 import asyncio
 import json
 import os
+import socket
 import stat
 from contextlib import suppress
 from pathlib import Path
@@ -85,6 +86,14 @@ class Client:
             self.send({"id": number, **answer})
 
 
+def _heard(path: Path) -> bool:
+    """Whether a socket has a listener; one that was left behind has none."""
+    with socket.socket(socket.AF_UNIX) as asking, suppress(FileNotFoundError, ConnectionRefusedError):
+        asking.connect(str(path))
+        return True
+    return False
+
+
 class KlippyDoor:
     """The socket at one path; only this user may open it."""
 
@@ -101,6 +110,8 @@ class KlippyDoor:
         """Listen; JobError when the path is taken by something else."""
         if self.path.exists() and not stat.S_ISSOCK(self.path.stat().st_mode):
             raise refused(f"{self.path} is there already and is no socket", "name another --klippy-socket")
+        if _heard(self.path):
+            raise refused(f"something listens at {self.path} already", "name another --klippy-socket")
         self.path.unlink(missing_ok=True)
         before = os.umask(0o077)
         try:

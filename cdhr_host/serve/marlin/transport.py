@@ -78,9 +78,14 @@ class PtyDoor:
         """what the event loop looks out for; asking it for what it does already is dear"""
 
     def open(self) -> None:
-        """Make the name, wait for clients."""
+        """Make the name, wait for clients; JobError when it means something else already."""
         if self.link.exists() and not self.link.is_symlink():
             raise refused(f"{self.link} is there already and is no link", "give another name to --marlin")
+        if self.link.exists() and os.readlink(self.link) != self.path:
+            raise refused(
+                f"{self.link} leads to {os.readlink(self.link)}, which is in use",
+                "another cdhr serve? Give another name to --marlin, or remove this one",
+            )
         fresh = self.link.with_name(f"{self.link.name}.{os.getpid()}")
         fresh.symlink_to(self.path)
         fresh.replace(self.link)

@@ -238,6 +238,10 @@ async def _told(request: web.Request, handler: Handler) -> web.StreamResponse:
         return refuse(request, error.code if error.code > 0 else 400, str(error))
     except TimeoutError:
         return refuse(request, 408, "the client was too slow")
+    except ConnectionError:
+        raise
+    except OSError as error:
+        return refuse(request, 507, f"the disk of this machine: {error.strerror or error}")
     except (HttpProcessingError, ValueError, TypeError, AttributeError, RecursionError) as error:
         LOG.debug("a request that was not understood", exc_info=error)
         return refuse(request, 400, "the request was not understood")

@@ -181,7 +181,7 @@ class Methods:
 
     def _directory(self, _: Session, params: Params) -> Result:
         """Only the first level: folders are named, not walked."""
-        root, _, inside = str(params.get("path", "gcodes")).strip("/").partition("/")
+        root, inside = (*str(params.get("path", "gcodes")).strip("/").split("/", 1), "")[:2]
         if root != "gcodes":
             raise RpcError(400, f"Invalid root path ({shown(root)})")
         if inside and inside not in self.host.folder.folders():
