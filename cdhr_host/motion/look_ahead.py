@@ -17,8 +17,8 @@ import numpy as np
 from cdhr_host.motion.cells import Cells
 from cdhr_host.values import Array, Ints
 
-NEWTON_STEPS = 8
-"""From above, towards the root of a rising convex function that is never flat."""
+NEWTON_STEPS = 6
+"""From at most twice the root of a rising convex function that is never flat, from above."""
 HALVINGS = 48
 """Of an interval of speeds: to rounding."""
 SPARE = 1 - 1e-6
@@ -101,8 +101,12 @@ def _shortest(both: tuple[End, End], cells: Cells) -> Array:
 
 def _below_peak(peak: Array, pull: Array, jerk: Array) -> Array:
     """(K,) m/s: speed of an end that leads to a peak, v + (pull v²)²/2j = peak."""
-    speed, steep = peak.copy(), np.divide(pull**2, 2 * jerk, out=np.zeros_like(pull), where=pull > 0)
-    for _ in range(NEWTON_STEPS if pull.any() else 0):
+    steep = np.divide(pull**2, 2 * jerk, out=np.zeros_like(pull), where=pull > 0)
+    if not pull.any():
+        return peak
+    alone = np.divide(peak, steep, out=np.full_like(peak, np.inf), where=steep > 0)
+    speed = np.minimum(peak, np.sqrt(np.sqrt(alone)))
+    for _ in range(NEWTON_STEPS):
         speed -= (speed + steep * speed**4 - peak) / (1 + 4 * steep * speed**3)
     return speed
 
@@ -212,9 +216,12 @@ class _Way:
 
     def below_peak(self) -> float:
         """m/s: speed of the other end that leads to the given end's peak."""
-        peak = speed = self.first[2]
+        peak = self.first[2]
         steep = self.pull**2 / (2 * self.j)
-        for _ in range(NEWTON_STEPS if steep else 0):
+        if not steep:
+            return peak
+        speed = min(peak, math.sqrt(math.sqrt(peak / steep)))
+        for _ in range(NEWTON_STEPS):
             speed -= (speed + steep * speed**4 - peak) / (1 + 4 * steep * speed**3)
         return speed
 
