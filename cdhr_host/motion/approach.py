@@ -31,6 +31,8 @@ ONWARDS = 0.5
 """Least cosine between a moved segment and its straight."""
 LEAST = 2.5
 """half-widths, the shortest straight made."""
+TOUCHING = 1e-9
+"""m and rad: equal but for rounding, which must not decide what is moved."""
 SPECK = 0.01
 """Of two corners' distance, what is left of it when they become one."""
 
@@ -49,14 +51,14 @@ class _Drawn:
     """(K,) points"""
 
     @classmethod
-    def of(cls, points: Array) -> "_Drawn":
-        """A polyline."""
+    def of(cls, points: Array, sharp: Ints | None = None) -> "_Drawn":
+        """A polyline, whose sharp corners may be known."""
         steps = np.diff(points, axis=0)
         length = norms(steps)
         turn = np.zeros(len(points))
         turn[1:-1] = norms(np.diff(steps / length[:, None], axis=0))
         along = np.concatenate(([0.0], np.cumsum(length)))
-        return cls(points, along, turn, np.flatnonzero(turn > SHARP))
+        return cls(points, along, turn, np.flatnonzero(turn > SHARP) if sharp is None else sharp)
 
     def reversed(self) -> "_Drawn":
         """The same from its end."""
@@ -65,26 +67,50 @@ class _Drawn:
         return _Drawn(self.points[::-1], along, self.turn[::-1], last - self.sharp[::-1])
 
 
-def straightened(points: Array, feed: Array, h: float) -> tuple[Array, Array]:
-    """(M+1, 3) m, (M,) m/s -> points as they are to be driven, and (M+1,) m by how much what lies around
-    each was moved.
-    """
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """What became of the points of a polyline."""
+
+    spent: Array
+    """(M+1,) m, by how much what lies around each was moved"""
+    firm: int
+    """The first point that further drawing might move, or around which it might"""
+
+
+def straightened(points: Array, feed: Array, h: float) -> tuple[Array, Moved]:
+    """(M+1, 3) m, (M,) m/s -> points as they are to be driven."""
     spent = np.zeros(len(points))
     drawn = _Drawn.of(points)
+    firm = _firm(drawn, h)
     if len(points) < 3 or not len(drawn.sharp):
-        return points, spent
-    drawn = _Drawn.of(_paired(drawn, feed, h, spent))
+        return points, Moved(spent, firm)
+    drawn = _Drawn.of(_paired(drawn, feed, h, spent), drawn.sharp)
     whole, first, last = _joining(drawn, h)
     forth, back = _onwards(drawn, whole, h), _onwards(drawn.reversed(), whole[::-1], h)
     end = len(points) - 1
     first = np.concatenate((first, forth[0], end - back[1]))
     last = np.concatenate((last, forth[1], end - back[0]))
-    return _moved(drawn, first, last, spent), spent
+    return _moved(drawn, first, last, spent), Moved(spent, firm)
 
 
 def reach(h: float) -> float:
-    """m of path, to each side, on which the place of a point depends."""
-    return (3 * REACH + 8) * h
+    """m of path drawn before a point on which its place depends, and one segment more."""
+    return (2 * REACH + 2 * SPENT) * h
+
+
+def _firm(drawn: _Drawn, h: float) -> int:
+    """The first point that further drawing might move, or around which it might.
+
+    A sharp corner might be next: with a straight of its own, joined to the corner before it, or paired.
+    """
+    along, pair = drawn.along, 2 * SPENT * h
+    sharp, end = drawn.sharp, along[-1]
+    if len(sharp) and sharp[-1] == len(along) - 2 and end - along[sharp[-1]] <= pair:
+        sharp, end = sharp[:-1], along[sharp[-1]]
+    place = end - REACH * h - pair
+    if len(sharp) and end - along[sharp[-1]] <= 2 * REACH * h + pair:
+        place = along[sharp[-1]]
+    return int(np.searchsorted(along, place - TOUCHING))
 
 
 def _paired(drawn: _Drawn, feed: Array, h: float, spent: Array) -> Array:
@@ -122,7 +148,7 @@ def _onwards(drawn: _Drawn, whole: Flags, h: float) -> tuple[Ints, Ints]:
     first, apart = sharp[undone], apart[undone]
     last, found = first.copy(), np.zeros(len(first), dtype=np.bool_)
     for part in TRIES:
-        most = along[first] + np.minimum(part * REACH * h, apart / 2)
+        most = along[first] + np.minimum(part * REACH * h, apart / 2) + TOUCHING
         end = np.searchsorted(along, most, "right") - 1
         usable = ~found & (end > first + 1) & (end < len(along) - 1)
         usable[usable] = _calm(drawn, first[usable], end[usable], h)
@@ -135,7 +161,7 @@ def _calm(drawn: _Drawn, first: Ints, last: Ints, h: float) -> Flags:
     """Whether the straight is long enough, and what follows gentle enough, for its corner to stand alone."""
     turned = np.concatenate(([0.0], np.cumsum(drawn.turn)))
     beyond = np.searchsorted(drawn.along, drawn.along[last] + 2 * h, "right")
-    gentle = turned[beyond] - turned[first + 1] <= CALM
+    gentle = turned[beyond] - turned[first + 1] <= CALM + TOUCHING
     return np.asarray(gentle & (drawn.along[last] - drawn.along[first] >= LEAST * h), dtype=np.bool_)
 
 

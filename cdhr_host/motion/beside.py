@@ -1,8 +1,13 @@
 """How far the rounding of each corner may reach along the straights beside it.
 
-Neighbours share the straight between them: the sharper a corner, the more of it. A
-straight goes on over points that are no corners. What is braked ends where the feed changes.
+A corner needs no more than the way from its feed to rest. Where a straight is long enough, both its
+corners have what they need; else they share it, the sharper one getting more. So a corner's room depends
+on no more of the path than twice that way. What is braked ends where the feed changes. A straight
+goes on over points that are no corners.
 """
+
+import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,32 +21,100 @@ GENTLE = 0.1
 """Root of the least turn that counts."""
 
 
-def rooms(drawn: Array, corner: Ints, turn: Array, *, least: float, most: Array) -> Array:
-    """(2, K) m before and after each corner at points ``corner`` (K,) of a polyline.
+@dataclass(frozen=True, slots=True)
+class Allowance:
+    """How fast the corners of a path may be taken."""
 
-    ``drawn`` (M+1,) m is how far along each point is, ``turn`` (K,) the change of direction; none
-    needs more than ``most`` (K,) m. Where a straight is long enough, both corners have at least ``least`` m.
+    feed: Array
+    """(M,) m/s on each segment"""
+    share: Array
+    """(M,) of acceleration and jerk that may be spent on changing speed there"""
+    acceleration: float
+    """m/s²"""
+    jerk: float
+    """m/s³"""
+
+    def ways(self) -> Array:
+        """(M,) m from the feed of each segment to rest."""
+        return way(self.feed, self.acceleration, self.jerk)
+
+    def changes(self) -> Flags:
+        """(M-1,) whether another feed or share begins at each inner point."""
+        return np.asarray((np.diff(self.feed) != 0.0) | (np.diff(self.share) != 0.0), dtype=np.bool_)
+
+
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """What lies beside K corners of a polyline; rows of pairs are before and after."""
+
+    at: Array
+    """(K,) m of the polyline"""
+    needed: Array
+    """(2, K) m of straight that each can make use of"""
+    room: Array
+    """(2, K) m that each has"""
+    even: Array
+    """(2, K) m of that in which the feed stays"""
+    ways: Array
+    """(M,) m of straight that a corner can make use of on each segment"""
+    least: float
+    """m that each has at least where the straight is long enough"""
+
+    def firm(self, sure: int, edge: float, onward: float) -> float:
+        """m of the polyline up to which no further drawing changes the path.
+
+        The turns of the first ``sure`` corners stay as they are, and up to ``edge`` m the path does not turn
+        any more; the next corner can make use of ``onward`` m before it.
+        """
+        if sure:
+            last, (before, after) = float(self.at[sure - 1]), self.needed[:, sure - 1]
+            if edge - last < after + onward:
+                return last - max(self.least, float(before))
+        return edge - max(self.least, onward)
+
+
+def beside(drawn: Array, corner: Ints, turn: Array, *, least: float, allowed: Allowance | None) -> Beside:
+    """Of the corners at points ``corner`` (K,) of a polyline, whose changes of direction are ``turn`` (K,).
+
+    ``drawn`` (M+1,) m is how far along each point is.
     """
-    between = np.diff(drawn[corner], prepend=drawn[0], append=drawn[-1])
+    at, count = drawn[corner], len(drawn) - 1
+    ways = np.full(count, math.inf) if allowed is None else np.maximum(allowed.ways(), 2 * least)
+    changes = np.zeros(count - 1, dtype=np.bool_) if allowed is None else allowed.changes()
+    even = _even(drawn, at, changes)
+    needed = np.minimum(np.stack((ways[corner - 1], ways[corner])), np.maximum(even, 2 * least))
+    between = np.diff(at, prepend=drawn[0], append=drawn[-1])
+    both = np.concatenate((ways[:1], needed[1])), np.concatenate((needed[0], ways[-1:]))
+    room = _rooms(between, turn, both, least)
+    return Beside(at, needed, room, np.minimum(room, even), ways, least)
+
+
+def _rooms(between: Array, turn: Array, needed: tuple[Array, Array], least: float) -> Array:
+    """(2, K) m before and after each corner.
+
+    ``between`` (K+1,) m are the straights around them, ``needed`` what the corner or stop before each of
+    these, and the one after it, can make use of.
+    """
     weight = np.concatenate(([STOP], np.maximum(np.sqrt(turn), GENTLE), [STOP]))
-    kept = np.minimum(least, between / 2)
-    after = np.clip(between * weight[:-1] / (weight[:-1] + weight[1:]), kept, between - kept)
-    found = np.stack(((between - after)[:-1], after[1:]))
-    return np.asarray(APART * np.minimum(found, np.maximum(most, 2 * least)), dtype=np.float64)
+    (left, right), kept = needed, np.minimum(least, between / 2)
+    share = between * weight[:-1] / (weight[:-1] + weight[1:])
+    part = np.minimum(np.maximum(share, np.maximum(between - right, kept)), np.minimum(left, between - kept))
+    ample = between >= left + right
+    after, before = np.where(ample, left, part), np.where(ample, right, between - part)
+    return np.asarray(APART * np.stack((before[:-1], after[1:])), dtype=np.float64)
 
 
-def same_feed(drawn: Array, corner: Ints, changes: Flags) -> Array:
-    """(2, K) m before and after each corner in which the feed stays; ``changes`` (M+1,) tells where not."""
-    at = drawn[corner]
-    borders = np.concatenate(([-np.inf], drawn[changes], [np.inf]))
+def _even(drawn: Array, at: Array, changes: Flags) -> Array:
+    """(2, K) m before and after each corner in which the feed stays."""
+    borders = np.concatenate(([-np.inf], drawn[1:-1][changes], [np.inf]))
     right, left = np.searchsorted(borders, at, "right"), np.searchsorted(borders, at, "left") - 1
     return np.asarray(np.stack((at - borders[left], borders[right] - at)), dtype=np.float64)
 
 
 def way(speed: Array, acceleration: float, jerk: float) -> Array:
-    """(K,) m/s -> (K,) m from there to rest: no corner needs more."""
+    """(K,) m/s -> (K,) m from there to rest."""
     hard, soft = speed / acceleration + acceleration / jerk, 2 * np.sqrt(speed / jerk)
-    return np.asarray(speed * np.maximum(hard, soft) / 2, dtype=np.float64)
+    return np.asarray(speed * np.where(speed * jerk > acceleration**2, hard, soft) / 2, dtype=np.float64)
 
 
 def norms(vectors: Array) -> Array:

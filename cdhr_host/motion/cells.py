@@ -122,19 +122,18 @@ def cells(
     cap = np.minimum(rows.cap, _pushed_speed(rows, limits))
     speed, spent = shares(cap, rows.room, rows.bends, rows.long, rows.braked, limits)
     spent = np.minimum(spent, rows.spend)
-    heads, settled = _alike(rows, speed, spent, h, passed)
+    heads, settled = _alike(rows, speed, spent, h, (passed, _begun(path, span[0])))
     open_end = bool(rows.bent[-1])
     rows, speed, spent = (
         _merged(rows, heads),
         np.minimum.reduceat(speed, heads),
         np.minimum.reduceat(spent, heads),
     )
-    spent, last = _levelled(rows, speed, spent, passed)
+    spent, last = _levelled(rows, speed, spent, passed, settled if open_end else np.inf)
     heads = _heads(speed, spent, *rows.brake, _multiples(rows.start + passed, _longest(speed)))
     rows, speed, spent = _merged(rows, heads), speed[heads], spent[heads]
     a, j = spent * limits.acceleration, spent * limits.jerk
-    known = min(settled if open_end else span[1], last)
-    return Cells(rows.start, rows.length, speed, a, j, known, rows.long, _pulls(rows.brake))
+    return Cells(rows.start, rows.length, speed, a, j, min(span[1], last), rows.long, _pulls(rows.brake))
 
 
 def _pushed_speed(rows: _Stretches, limits: MotionLimits) -> Array:
@@ -222,11 +221,22 @@ def _merged(rows: _Stretches, heads: Ints) -> _Stretches:
     )
 
 
-def _alike(rows: _Stretches, speed: Array, share: Array, h: float, passed: float) -> tuple[Ints, float]:
+def _begun(path: SmoothPath, s: float) -> bool:
+    """Whether a bend has begun before a place."""
+    piece = int(np.searchsorted(path.start, s - TOUCHING, side="right")) - 1
+    return piece >= 0 and bool(path.bending[piece] > 0 and not path.brake[:, piece].any())
+
+
+def _alike(
+    rows: _Stretches, speed: Array, share: Array, h: float, before: tuple[float, bool]
+) -> tuple[Ints, float]:
     """First of each group of cells of a long bend that are alike, and where the last group begins.
 
     Groups begin at multiples of their size, so that they are the same whenever planned again.
+    ``before``: m passed before s = 0, and whether the first bend has begun earlier. A group that has, too,
+    was not alike: else no border would lie in it.
     """
+    passed, begun = before
     place = _multiples(rows.start + passed, CELL * h)
     place = np.where(rows.long, place, -1.0 - np.arange(len(place)))
     label = np.arange(len(place), dtype=float)
@@ -238,16 +248,19 @@ def _alike(rows: _Stretches, speed: Array, share: Array, h: float, passed: float
         even &= np.minimum.reduceat(share, heads) >= ALIKE[1] * np.maximum.reduceat(share, heads)
         even &= rows.long[heads] & (size <= most[heads])
         even &= np.minimum.reduceat(rows.cap, heads) == np.maximum.reduceat(rows.cap, heads)
+        even[0] &= not begun or place[0] % size == 0
         label = np.where(even[group], heads[group], label)
     greatest = max((size for size in SIZES if size <= most[-1]), default=1)
     last = _heads(rows.run, np.floor(place / greatest))[-1]
     return _heads(label), float(rows.start[last])
 
 
-def _levelled(rows: _Stretches, speed: Array, share: Array, passed: float) -> tuple[Array, float]:
+def _levelled(
+    rows: _Stretches, speed: Array, share: Array, passed: float, settled: float
+) -> tuple[Array, float]:
     """Shares (K,), the same in rows of bends that take little and the short straights between them.
 
-    And where the last row begins, if it may go on.
+    And where the last of these begins that may go on beyond what is ``settled`` (m), or else that.
     """
     free = (share >= FREE) & (rows.bent | (rows.length < SHORT)) & ~rows.braked
     heads = _heads(free, speed, _multiples(rows.start + passed, _longest(speed)))
@@ -255,7 +268,9 @@ def _levelled(rows: _Stretches, speed: Array, share: Array, passed: float) -> tu
     least = np.repeat(np.minimum.reduceat(share, heads), count)
     bent = np.repeat(np.logical_or.reduceat(rows.bent, heads), count)
     level = np.where(free & bent, least, share)
-    return level, float(rows.start[heads[-1]]) if free[-1] else np.inf
+    last = int(np.searchsorted(rows.start, settled)) - 1
+    open_row = heads[np.searchsorted(heads, last, side="right") - 1] if last >= 0 and free[last] else last + 1
+    return level, float(rows.start[open_row]) if open_row < len(rows.start) else np.inf
 
 
 def _longest(speed: Array) -> Array:

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdhr_host.motion.beside import APART
+from cdhr_host.motion.beside import Allowance, Beside
 from cdhr_host.values import Array, Ints
 
 SHARES = np.linspace(-1.0, 1.0, 9)
@@ -36,20 +36,10 @@ FINER = (0.125, 0.04)
 NEARBY = np.array([0.0, -1.0, 1.0])
 HALVINGS = 12
 """Of an interval of speeds, to compare times."""
-
-
-@dataclass(frozen=True, slots=True)
-class Allowance:
-    """How fast the corners of a path may be taken."""
-
-    feed: Array
-    """(M,) m/s on each segment"""
-    share: Array
-    """(M,) of acceleration and jerk that may be spent on changing speed there"""
-    acceleration: float
-    """m/s²"""
-    jerk: float
-    """m/s³"""
+TIED = 1e-9
+"""Of a time, less is no gain: which of two equal ways is taken must not depend on rounding."""
+ALONE = 0.999
+"""Of the usual half-width, the least room on both sides of a corner that stands alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,28 +90,21 @@ class Widths:
 
 
 def roundings(
-    rooms: tuple[Array, Array],
-    corner: Ints,
-    turns: tuple[Array, Array],
-    widths: Widths,
-    allowed: Allowance | None,
+    around: Beside, corner: Ints, turn: Array, widths: Widths, allowed: Allowance | None
 ) -> Rounding:
-    """Roundings of the corners at some points of a polyline.
-
-    ``rooms`` are (2, K) m each before and after them: of the straights, and of those as far as the
-    feed stays. ``turns`` are the directions (K, 3) before and after each corner.
-    """
-    h, turn = widths.usual, np.sqrt(((turns[1] - turns[0]) ** 2).sum(axis=1))
-    reach = rooms[0].min(axis=0)
-    half = np.where(reach >= APART * h, np.minimum(reach, 2 * widths.own / turn), h)
-    half = np.minimum(half, widths.ends / 2)
+    """Roundings of the corners at points ``corner`` (K,) of a polyline, with changes of direction (K,)."""
+    reach = around.room.min(axis=0)
+    alone = reach >= ALONE * widths.usual
+    half = np.where(
+        alone, np.minimum(reach, 2 * widths.own / turn), np.minimum(widths.usual, widths.ends / 2)
+    )
     none, steep = np.zeros((2, len(half))), 1 / half**2
     found = Rounding(half, none, none.copy(), np.array([[-steep, steep], [steep, -steep]]))
     if allowed is not None:
         share = _beside(allowed.share, corner, 0.0).min(axis=0)
         limits = np.multiply.outer(np.array([allowed.acceleration, allowed.jerk]), share)
-        around = Corners(turn, rooms[1], _beside(allowed.feed, corner, 0.0), limits, widths.own)
-        _brake(found, _worthwhile(half, around, h, allowed), around)
+        corners = Corners(turn, around.even, _beside(allowed.feed, corner, 0.0), limits, widths.own)
+        _brake(found, _worthwhile(half, corners, widths.usual, allowed), corners)
     return found
 
 
@@ -139,7 +122,7 @@ def _worthwhile(half: Array, around: Corners, h: float, allowed: Allowance) -> I
     by_jerk = np.cbrt(allowed.jerk * half**2 / around.turn)
     by_acceleration = np.sqrt(allowed.acceleration * half / around.turn)
     slow = np.minimum(by_jerk, by_acceleration) < around.feed.max(axis=0)
-    roomy = around.room.min(axis=0) >= APART * h
+    roomy = around.room.min(axis=0) >= ALONE * h
     return np.flatnonzero(slow & roomy & (around.limits[0] >= allowed.acceleration))
 
 
@@ -199,16 +182,22 @@ def _soonest(around: Corners) -> _Swing:
     """The best way around each corner: arrays (2, K) and (K,)."""
     share = np.stack(np.meshgrid(SHARES, SHARES)).reshape(2, 1, -1)
     swing = _swings(around, share)
-    best = np.argmin(_time(swing, around), axis=1)[:, None]
+    best = _first(_time(swing, around))
     share = share[:, 0, best]
     for step in FINER:
         around_it = step * np.stack(np.meshgrid(NEARBY, NEARBY)).reshape(2, 1, -1)
         near = np.clip(share + around_it, SHARES[0], SHARES[-1])
         swing = _swings(around, near)
-        best = np.argmin(_time(swing, around), axis=1)[:, None]
+        best = _first(_time(swing, around))
         share = np.take_along_axis(near, best[None], axis=2)
     best_r = np.take_along_axis(swing.r, best[None], axis=2)[:, :, 0]
     return _Swing(share[:, :, 0], best_r, np.take_along_axis(swing.duration, best, axis=1)[:, 0])
+
+
+def _first(times: Array) -> Ints:
+    """(K, S) -> (K, 1): the first of the least."""
+    found: Ints = np.argmax(times <= times.min(axis=1, keepdims=True) * (1 + TIED), axis=1)
+    return found[:, None]
 
 
 def _time(swing: _Swing, around: Corners) -> Array:

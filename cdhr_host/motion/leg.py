@@ -7,28 +7,24 @@ depend on when segments arrived.
 """
 
 import copy
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.motion.approach import reach, straightened
-from cdhr_host.motion.beside import norms, way
+from cdhr_host.motion.beside import Allowance, norms, way
 from cdhr_host.motion.cells import Cells, cells
-from cdhr_host.motion.corner import Allowance
 from cdhr_host.motion.flow import FlowLimits
 from cdhr_host.motion.limits import MotionLimits
-from cdhr_host.motion.look_ahead import border_speeds
+from cdhr_host.motion.look_ahead import border_speeds, stoppable
 from cdhr_host.motion.smooth_path import SmoothPath, smooth
 from cdhr_host.motion.time_law import TimeLaw, time_law
 from cdhr_host.units import MM
-from cdhr_host.values import Array, Flags, Ints
+from cdhr_host.values import Array, Ints
 
 BATCH = 2048
 """Segments collected before a plan is made."""
-MORE_ROOM = 0.5
-"""Of the way that braking to rest takes, kept in hand when a leg is committed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,8 +158,12 @@ class LegPlanner:
         """s that what is not committed would take at the feed asked for."""
         if self._segments is None:
             return 0.0
-        lengths = norms(np.diff(self._segments.points, axis=0))
-        return max(float((lengths / self._segments.feed).sum()), 0.0)
+        begin, segments = self._begin, self._segments
+        lengths = norms(np.diff(segments.points[begin.point :], axis=0))
+        lasting = float((lengths / segments.feed[begin.point :]).sum())
+        if len(lengths):
+            lasting -= begin.onwards / float(segments.feed[begin.point])
+        return max(lasting, 0.0)
 
     @property
     def due(self) -> bool:
@@ -177,7 +177,7 @@ class LegPlanner:
             return None
         self._planned = len(segments)
         path, segments = self._path(segments, closes=closes)
-        known = path.end if closes else self._known(path, segments)
+        known = path.end if closes else path.known
         first = float(path.drawn[self._begin.point] + self._begin.onwards)
         passed = self._begin.passed - first
         span = (first, known)
@@ -193,9 +193,13 @@ class LegPlanner:
             passed=passed,
             long=(self._inside or self._begin.passed == 0.0, closes),
         )
+        if not closes:
+            found = found.only(slice(int(np.searchsorted(found.start, found.settled))))
+        if not len(found.start):
+            return None
         speeds, forward = border_speeds(found, self._entry, 0.0)
         self._check_entry(speeds[0])
-        count = len(found.start) if closes else _settled(found, speeds == forward)
+        count = len(found.start) if closes else _settled(found, forward)
         if count == 0:
             return None
         law = time_law(found.only(slice(count)), speeds[: count + 1])
@@ -208,22 +212,10 @@ class LegPlanner:
     def _path(self, segments: Segments, *, closes: bool) -> tuple[SmoothPath, Segments]:
         """The smoothed path of what is not forgotten, and the segments as it follows them."""
         h, dropped = self._limits.half_width, self._begin.dropped
-        points, spent = straightened(segments.points, segments.feed, h)
+        points, moved = straightened(segments.points, segments.feed, h)
         allowed = self._allowed(segments)
-        path = smooth(points, h, passed=dropped, closes=closes, allowed=allowed, spent=spent)
+        path = smooth(points, h, passed=dropped, closes=closes, allowed=allowed, moved=moved)
         return path, replace(segments, points=points)
-
-    def _reach(self, speed: float) -> float:
-        """m of path drawn to each side on which the path at a place depends, up to a speed."""
-        limits = self._limits
-        return reach(limits.half_width) + 2 * float(way(np.array(speed), limits.acceleration, limits.jerk))
-
-    def _known(self, path: SmoothPath, segments: Segments) -> float:
-        """m in s up to which no further drawing changes the path."""
-        drawn = np.concatenate(([0.0], np.cumsum(norms(np.diff(segments.points, axis=0)))))
-        last = drawn[-1] - self._reach(float(segments.feed.max()))
-        point = int(np.searchsorted(drawn, last, side="right")) - 1
-        return float(path.drawn[point] + last - drawn[point]) if point >= 0 else -math.inf
 
     def _allowed(self, segments: Segments) -> Allowance:
         """As programmed, so that the path is the same with any feed."""
@@ -244,13 +236,23 @@ class LegPlanner:
         border = float(found.start[count])
         drawn = np.concatenate(([0.0], np.cumsum(norms(np.diff(segments.points, axis=0)))))
         point = int(np.searchsorted(path.drawn, border, side="right")) - 1
-        first = int(np.searchsorted(drawn, drawn[point] - self._reach(self._limits.speed), side="right")) - 1
-        first = max(first, 0)
+        needed = drawn[point] - self._reach(float(segments.feed[: point + 1].max()))
+        first = max(int(np.searchsorted(drawn, needed, side="right")) - 3, 0)
         self._segments = segments.part(first, len(segments))
         self._planned = len(self._segments)
         onwards, dropped = border - float(path.drawn[point]), begin.dropped + float(drawn[first])
         self._begin = _Begin(point - first, onwards, border + passed, dropped)
         self._inside = bool(found.bent[count])
+
+    def _reach(self, speed: float) -> float:
+        """m of path drawn before a place on which the path there depends, at speeds up to this.
+
+        A corner whose rounding goes on there lies at most one room before, what lies beside it depends on
+        two rooms more, and a turn on where points were moved.
+        """
+        limits = self._limits
+        room = max(float(way(np.array(speed), limits.acceleration, limits.jerk)), 2 * limits.half_width)
+        return 3 * room + 2 * reach(limits.half_width)
 
     def _check_entry(self, speed: float) -> None:
         if speed < self._entry * (1 - 1e-9):
@@ -265,18 +267,10 @@ class LegPlanner:
             )
 
 
-def _settled(found: Cells, final: Flags) -> int:
-    """How many cells can be committed: up to a border whose speed nothing further can raise.
+def _settled(found: Cells, forward: Array) -> int:
+    """How many cells can be committed: up to a border with way enough to brake, whatever follows.
 
-    Braking to rest begins at the last such border. What follows may instead end the leg in
-    a slower cell, and slowing down to a third of a speed takes 9 % more way than to rest; so
-    the border is taken that leaves MORE_ROOM beyond the way that rest would need. A straight after
-    a corner that is braked into stays with that corner.
+    A straight after a corner that is braked into stays with that corner.
     """
-    usable = np.flatnonzero(final[:-1] & (found.start < found.settled) & (found.pulls[0] == 0.0))
-    if not len(usable):
-        return 0
-    room = np.concatenate(([0.0], np.cumsum(np.where(found.acceleration > 0.0, found.length, 0.0))))
-    braking = room[-1] - room[usable[-1]]
-    early = usable[room[usable] <= room[usable[-1]] - MORE_ROOM * braking]
-    return int(early[-1]) if len(early) else 0
+    usable = np.flatnonzero(stoppable(found, forward)[:-1] & (found.pulls[0] == 0.0))
+    return int(usable[-1]) if len(usable) else 0

@@ -26,8 +26,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdhr_host.motion.beside import norms, rooms, same_feed, way
-from cdhr_host.motion.corner import Allowance, Rounding, Widths, roundings
+from cdhr_host.motion.approach import Moved
+from cdhr_host.motion.beside import Allowance, Beside, beside, norms
+from cdhr_host.motion.corner import Rounding, Widths, roundings
 from cdhr_host.values import Array, Flags, Ints
 
 STRAIGHT = 1e-9
@@ -53,6 +54,8 @@ class SmoothPath:
     and grows on the one after, than s'² would make it"""
     drawn: Array
     """(M+1,) m, s from which each drawn segment goes on straight; for the last point, its end"""
+    known: float
+    """m, s up to which no further drawing changes the path"""
 
     def lengths(self) -> Array:
         """(K,) m: length in s of each piece."""
@@ -105,7 +108,7 @@ def smooth(
     passed: float = math.inf,
     closes: bool = False,
     allowed: Allowance | None = None,
-    spent: Array | None = None,
+    moved: Moved | None = None,
 ) -> SmoothPath:
     """(M+1, 3) m: the smoothed path of a polyline with M segments of positive length.
 
@@ -113,7 +116,7 @@ def smooth(
     ``closes``, at the last; there the result is the drawn path. Otherwise it is exact only from
     the farthest reach of a kernel after the first point to as much before the last. Pieces begin
     at s = -h. With an allowance, corners that would cost much speed are braked into.
-    ``spent`` (M+1,) m is by how much the ways beside the points were moved already (``motion.approach``).
+    ``moved`` is what was done to the points already (``motion.approach``).
     """
     steps = np.diff(points, axis=0)
     lengths = norms(steps)
@@ -121,11 +124,10 @@ def smooth(
     direction = steps / lengths[:, None]
     corner, turns = _corners(direction)
     ends = np.minimum(passed + drawn[corner], drawn[-1] - drawn[corner] if closes else math.inf)
-    own = h - 3.0 * (np.zeros(len(points)) if spent is None else spent)[corner]
-    turned = norms(turns[1] - turns[0])
-    room = rooms(drawn, corner, turned, least=h, most=_needed(allowed, corner))
-    even = same_feed(drawn, corner, _changes(allowed, len(points)))
-    rounding = roundings((room, np.minimum(room, even)), corner, turns, Widths(h, own, ends), allowed)
+    turn = norms(turns[1] - turns[0])
+    around = beside(drawn, corner, turn, least=h, allowed=allowed)
+    own = h - 3.0 * (np.zeros(len(points)) if moved is None else moved.spent)[corner]
+    rounding = roundings(around, corner, turn, Widths(h, own, ends), allowed)
     saved = np.zeros((2, len(points)))
     saved[:, corner] = rounding.saved
     after = drawn + np.cumsum(saved.sum(axis=0))
@@ -145,23 +147,18 @@ def smooth(
     onwards = points[segment] + (knots - after[segment])[:, None] * direction[segment]
     value = _anchored(value, onwards, straight)
     coefficients = np.stack([np.ascontiguousarray(rows.T) for rows in (value, slope, second, third)])
-    return SmoothPath(knots, float(last), coefficients, segment, kinks.bending, kinks.brake, after)
+    known = _known(around, corner, moved, drawn, after)
+    return SmoothPath(knots, float(last), coefficients, segment, kinks.bending, kinks.brake, after, known)
 
 
-def _changes(allowed: Allowance | None, count: int) -> Flags:
-    """(M+1,) points at which another feed begins."""
-    found = np.zeros(count, dtype=np.bool_)
-    if allowed is not None:
-        found[1:-1] = (np.diff(allowed.feed) != 0.0) | (np.diff(allowed.share) != 0.0)
-    return found
-
-
-def _needed(allowed: Allowance | None, corner: Ints) -> Array:
-    """(K,) m of straight on each side that corners at points (K,) can make use of."""
-    if allowed is None:
-        return np.full(len(corner), math.inf)
-    around = np.maximum(allowed.feed[corner - 1], allowed.feed[np.minimum(corner, len(allowed.feed) - 1)])
-    return way(around, allowed.acceleration, allowed.jerk)
+def _known(around: Beside, corner: Ints, moved: Moved | None, drawn: Array, after: Array) -> float:
+    """m in s up to which no further drawing changes the path."""
+    edge = 0 if moved is None else moved.firm - 1
+    if edge < 1:
+        return -math.inf
+    known = around.firm(int(np.searchsorted(corner, edge)), float(drawn[edge]), around.ways[edge - 1])
+    point = int(np.searchsorted(drawn, known, side="right")) - 1
+    return float(after[point] + known - drawn[point]) if point >= 0 else -math.inf
 
 
 def _dot(a: Array, b: Array) -> Array:

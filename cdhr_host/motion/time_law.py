@@ -4,11 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdhr_host.errors import MotionError, Problem
 from cdhr_host.motion.cells import Cells
 from cdhr_host.motion.look_ahead import ends, peak_speeds
 from cdhr_host.motion.speed_change import speed_change
+from cdhr_host.units import MM
 from cdhr_host.values import Array
 
+ROUNDING = 1e-10
+"""m by which a change of speed may be longer than its cell."""
 INSIDE = 32 * float(np.finfo(np.float64).eps)
 """By how much of a leg's length s keeps off the borders of its cell: s'' may jump there, and q'' with it,
 so that rounding must not pair a law with the path beyond. More than rounding, and no more than needed:
@@ -58,9 +62,22 @@ def time_law(cells: Cells, borders: Array) -> TimeLaw:
     way = _way(duration[:, :3], jerk[:, :3], borders[:-1], a0) + _way(
         duration[:, 4:], jerk[:, 4:], peaks, none
     )
+    _check(way - cells.length)
     duration[:, 3] = np.maximum(cells.length - way, 0.0) / peaks
     last = float(cells.start[-1] + cells.length[-1])
     return _integrated(cells.start, (borders[:-1], a0), last, duration, jerk)
+
+
+def _check(over: Array) -> None:
+    """Raise MotionError if changing speed takes more way (K,) m than there is, by more than rounding."""
+    if len(over) and float(over.max()) > ROUNDING:
+        raise MotionError(
+            Problem(
+                "unplannable",
+                f"a change of speed takes {float(over.max()) / MM:.3g} mm more than the path has",
+                hint="please report this as a bug, with the program",
+            )
+        )
 
 
 def _change(

@@ -10,7 +10,7 @@ from motion_tracks import distance_to, moves, norm
 
 from cdhr_host.motion import approach
 from cdhr_host.motion.approach import SPENT, straightened
-from cdhr_host.motion.corner import Allowance
+from cdhr_host.motion.beside import Allowance
 from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.planner import Planner
 from cdhr_host.motion.smooth_path import smooth
@@ -48,11 +48,11 @@ def test_the_path_stays_within_the_tolerance_of_what_was_drawn(drawn, seed):
         .choice([0.002, 0.03, 0.1], 9)
         .repeat(len(points) // 9 + 1)[1 : len(points)]
     )
-    driven, spent = straightened(points, feed, H)
+    driven, moved = straightened(points, feed, H)
     assert norm(driven - points).max() <= SPENT * H * (1 + 1e-9)
     assert np.array_equal(driven[[0, -1]], points[[0, -1]])
     assert (norm(np.diff(driven, axis=0)) > 0).all()
-    path = smooth(driven, H, passed=0.0, closes=True, allowed=Allowance(feed, feed / feed, A, J), spent=spent)
+    path = smooth(driven, H, passed=0.0, closes=True, allowed=Allowance(feed, feed / feed, A, J), moved=moved)
     _, position, slope, _ = path.at(np.linspace(0, path.end, 1500))
     assert distance_to(position, points).max() <= H / 3 * (1 + 1e-6)
     assert distance_to(points, position).max() <= H / 3 + path.end / 1500
@@ -61,17 +61,17 @@ def test_the_path_stays_within_the_tolerance_of_what_was_drawn(drawn, seed):
 
 def test_what_has_no_sharp_corner_is_left_as_it_is():
     points = curves([0.0], [0.02], [1e-3])
-    driven, spent = straightened(points, np.ones(len(points) - 1), H)
+    driven, moved = straightened(points, np.ones(len(points) - 1), H)
     assert driven is points
-    assert not spent.any()
+    assert not moved.spent.any()
 
 
 def test_two_corners_at_a_speck_become_one():
     points = np.array([[-0.02, 0, 0], [0, 0, 0], [0, 1e-4, 0], [-0.02, 1e-4, 0]])
-    driven, spent = straightened(points, np.array([0.06, 0.06, 0.03]), H)
+    driven, moved = straightened(points, np.array([0.06, 0.06, 0.03]), H)
     assert np.allclose(driven[2], [0, 5e-5, 0])
     assert norm(driven[1:2] - driven[2:3]) == pytest.approx(1e-6)
-    assert spent[2] == pytest.approx(5.1e-5)
+    assert moved.spent[2] == pytest.approx(5.1e-5)
 
 
 def test_a_corner_between_curves_takes_less_time(monkeypatch):

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from motion_tracks import distance_to, moves, norm
 
-from cdhr_host.motion.corner import Allowance
+from cdhr_host.motion.beside import Allowance
 from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.planner import Planner
 from cdhr_host.motion.smooth_path import smooth

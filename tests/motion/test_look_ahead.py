@@ -9,7 +9,16 @@ from hypothesis import strategies as st
 
 from cdhr_host.errors import MotionError
 from cdhr_host.motion.cells import Cells
-from cdhr_host.motion.look_ahead import border_speeds, change_distance, ends, needed, peak_speeds, reachable
+from cdhr_host.motion.look_ahead import (
+    _below_peak,
+    border_speeds,
+    change_distance,
+    end,
+    ends,
+    needed,
+    peak_speeds,
+    reachable,
+)
 from cdhr_host.motion.speed_change import speed_change
 from cdhr_host.motion.time_law import time_law
 
@@ -121,3 +130,23 @@ def test_given_entry_and_exit_are_kept():
 def test_impossible_change_names_its_input():
     with pytest.raises(MotionError, match=r"0\.1 to 0\.2"):
         speed_change(0.1, 0.2, -1.0, 5.0)
+
+
+@given(st.floats(1e-6, 0.3), st.floats(0.0, 1e9))
+def test_an_end_that_leads_to_a_peak_is_found_however_strongly_it_pulls(peak, pull):
+    speed = _below_peak(np.array([peak]), np.array([pull]), np.array([5.0]))
+    assert end(speed, np.array([pull]), np.array([5.0])).peak[0] == pytest.approx(peak, rel=1e-12)
+
+
+def test_a_nozzle_all_but_at_rest_in_a_corner_needs_way_to_come_out_of_it():
+    # From 1 mm/s with s'' = 0.39 m/s² the speed rises to 16 mm/s, whatever comes then.
+    pulls = [[3.5e5, 0.0, 1300.0, 0.0], [0.0, 1300.0, 0.0, 0.0]]
+    found = cells([1.4e-3, 1e-3, 4e-3, 5e-3], 0.03, 0.5, 5.0, pulls)
+    speeds, _ = border_speeds(found, 1.06e-3, 0.0)
+    both = ends(found, speeds)
+    assert (needed(both, peak_speeds(found, both), found) <= found.length * (1 + 1e-9)).all()
+
+
+def test_a_change_of_speed_for_which_there_is_no_way_is_refused():
+    with pytest.raises(MotionError, match="mm more than the path has"):
+        time_law(cells([1e-3], 0.1, 0.5, 5.0), np.array([0.1, 0.0]))
