@@ -12,12 +12,13 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 from paths import machine, program_text, read, real_files
+from scipy.optimize import brentq
 from trapezoids import Polyline, Trapezoids, drawn, trapezoids
 
 from cdhr_host.motion.limits import MotionLimits
@@ -30,6 +31,8 @@ JUMP = 5.0 * MM
 """m/s, the baseline's greatest change of velocity at a junction"""
 PERIOD = 1e-3
 """s between the positions that are differenced"""
+STRAIGHT = 1e-9
+"""Directions that differ by less are one."""
 BLOCK = 100_000
 SMOKE_FILES = ("paper_eq35.gcode", "cura_tile_volumetric.gcode")
 
@@ -110,15 +113,42 @@ def _sampled(law: Trapezoids) -> Iterator[Array]:
 def stops_cost(commands: Iterable[Command], limits: MotionLimits) -> float:
     """s: by how much starting and stopping alone takes longer with the jerk limit than without.
 
-    From rest to a speed v, at best: with v = a t the way takes v/2a longer than at v, with jerk
-    (v/a + a/j)/2, or sqrt(v/j) below v = a²/j.
+    A straight line between two stops: exactly, for both fastest motions are known. Elsewhere from rest to a
+    speed v, at best: at v at once the way would take half the time that it does.
     """
-    a, j, total = limits.acceleration, limits.jerk, 0.0
+    total = 0.0
     for part in drawn(commands, limits):
-        if isinstance(part, Polyline):
-            for v in part.feed[[0, -1]].tolist():
-                total += max(v / a + a / j if v * j > a * a else 2 * math.sqrt(v / j), 0.0) / 2 - v / a / 2
+        if isinstance(part, Polyline) and _straight(part):
+            way, v = float(np.linalg.norm(part.points[-1] - part.points[0])), float(part.feed[0])
+            total += sum(sign * _there(way, v, rise) for sign, rise in _both(limits))
+        elif isinstance(part, Polyline):
+            total += sum(
+                sign * rise(v) / 2 for v in part.feed[[0, -1]].tolist() for sign, rise in _both(limits)
+            )
     return total
+
+
+Rise = Callable[[float], float]
+
+
+def _both(limits: MotionLimits) -> tuple[tuple[int, Rise], tuple[int, Rise]]:
+    """Time from rest to a speed, with the jerk limit (counted +1) and without (-1)."""
+    a, j = limits.acceleration, limits.jerk
+    return (1, lambda v: v / a + a / j if v * j > a * a else 2 * math.sqrt(v / j)), (-1, lambda v: v / a)
+
+
+def _straight(part: Polyline) -> bool:
+    """Whether it is one straight line at one speed."""
+    steps = np.diff(part.points, axis=0)
+    direction = steps / np.linalg.norm(steps, axis=1)[:, None]
+    return bool((part.feed == part.feed[0]).all() and np.abs(direction - direction[0]).max() < STRAIGHT)
+
+
+def _there(way: float, v: float, rise: Rise) -> float:
+    """s from rest to rest over a way, at a speed up to v: each rise and fall to u takes u rise(u)/2."""
+    if v * rise(v) > way:
+        v = float(brentq(lambda u: u * rise(u) - way, 0.0, v, xtol=1e-15))
+    return 2 * rise(v) + (way - v * rise(v)) / v
 
 
 @dataclass(frozen=True, slots=True)

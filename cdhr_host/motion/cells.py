@@ -50,7 +50,7 @@ class Cells:
     jerk: Array
     """(K,) m/s³, greatest |s'''|; 0 where the speed must stay constant"""
     settled: float
-    """m in s: cells before it keep their bounds whatever path follows"""
+    """m in s: cells up to it keep their bounds whatever path follows"""
     bent: Flags
     """(K,) whether the cell lies in a long bend"""
     pulls: Array
@@ -105,13 +105,13 @@ def cells(
     *,
     share: tuple[Array, Array],
     passed: float,
-    long: tuple[bool, bool],
+    long: tuple[float, float],
 ) -> Cells:
     """Cells of a path over a span of s.
 
     ``feed`` (K,) m/s is the speed wanted on each piece; the first ``share`` (K,) is what the air leaves of
     acceleration and jerk for changing it, the second what the cables leave of the acceleration;
-    ``long`` says whether a bend at the beginning or the end of the span counts as long in any case: it
+    a bend counts as long in any case if it begins or ends within ``long`` m of the span's ends: it
     was begun earlier, or the nozzle rests there. A leg is divided where its length, of which ``passed`` (m)
     lies before s = 0, is a multiple of a cell's; so it is divided alike whenever it is planned again, and
     what could be braked from a border still can.
@@ -162,7 +162,7 @@ def _between(
     wanted: tuple[Array, Array, Array],
     span: tuple[float, float],
     h: float,
-    at_ends: tuple[bool, bool],
+    at_ends: tuple[float, float],
 ) -> _Stretches:
     """The pieces of a path that lie in a span of s, cut at its ends; ``wanted``: speeds, both shares."""
     feed, share, room = wanted
@@ -176,7 +176,8 @@ def _between(
     run = np.cumsum((np.diff(bent, prepend=bent[0]) != 0) | (np.diff(braked, prepend=braked[0]) != 0))
     heads = np.flatnonzero(np.diff(run, prepend=-1))
     long = bent & (np.add.reduceat(length, heads)[run] > LONG_RUN * h)
-    long |= bent & ((at_ends[0] & (run == run[0])) | (at_ends[1] & (run == run[-1])))
+    begins, finishes = start[heads][run], np.append(start[heads[1:]], span[1])[run]
+    long |= bent & ((begins <= span[0] + at_ends[0]) | (finishes >= span[1] - at_ends[1]))
     bends = Bends.of(path).only(used)
     return _Stretches(
         start, length, feed[used], share[used], room[used], bends, bent, brake, run, long & ~braked

@@ -7,6 +7,7 @@ depend on when segments arrived.
 """
 
 import copy
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +15,7 @@ import numpy as np
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.motion.approach import reach, straightened
 from cdhr_host.motion.beside import Allowance, norms, way
-from cdhr_host.motion.cells import Cells, cells
+from cdhr_host.motion.cells import TOUCHING, Cells, cells
 from cdhr_host.motion.flow import FlowLimits
 from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.look_ahead import border_speeds, stoppable
@@ -191,10 +192,11 @@ class LegPlanner:
             self._limits,
             share=(share[path.segment], segments.room[path.segment]),
             passed=passed,
-            long=(self._inside or self._begin.passed == 0.0, closes),
+            long=self._always_long(closes=closes),
         )
         if not closes:
-            found = found.only(slice(int(np.searchsorted(found.start, found.settled))))
+            ends = found.start + found.length
+            found = found.only(slice(int(np.searchsorted(ends, found.settled + TOUCHING, side="right"))))
         if not len(found.start):
             return None
         speeds, forward = border_speeds(found, self._entry, 0.0)
@@ -208,6 +210,15 @@ class LegPlanner:
             self._advance(path, found, count, passed)
             self._entry = float(speeds[count])
         return leg
+
+    def _always_long(self, *, closes: bool) -> tuple[float, float]:
+        """m from both ends of what is planned in which a bend counts as long.
+
+        It was begun earlier, or kernels become narrower there towards a stop.
+        """
+        narrow = 2 * self._limits.half_width
+        first = narrow if self._begin.passed == 0.0 else 0.0 if self._inside else -math.inf
+        return first, narrow if closes else -math.inf
 
     def _path(self, segments: Segments, *, closes: bool) -> tuple[SmoothPath, Segments]:
         """The smoothed path of what is not forgotten, and the segments as it follows them."""

@@ -14,7 +14,7 @@ from cdhr_host.values import Arc, Blend, Moves, Plane, Spline
 
 PERIOD = 0.004
 TOLERANCE = 0.25e-3
-LIMITS = MotionLimits(0.1, 0.5, 5.0, half_width=half_width(TOLERANCE), stop_angle=math.radians(150))
+LIMITS = MotionLimits(0.1, 0.5, 5.0, half_width=half_width(TOLERANCE), stop_angle=math.radians(179))
 LENGTH = st.integers(-15_000, 15_000).map(lambda micrometre: micrometre * 1e-6)
 POINT = st.tuples(LENGTH, LENGTH, st.just(0.0)).map(np.array)
 SPEED = st.sampled_from([0.01, 0.04, 0.2])

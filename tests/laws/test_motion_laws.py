@@ -15,7 +15,7 @@ from cdhr_host.values import Dwell, Moves
 PERIOD = 0.004
 ROUNDING = 1e-13
 """m: of positions, where a bend of micrometres is centimetres into its leg"""
-LIMITS = MotionLimits(0.1, 0.5, 5.0, half_width=0.74e-3, stop_angle=math.radians(150))
+LIMITS = MotionLimits(0.1, 0.5, 5.0, half_width=0.74e-3, stop_angle=math.radians(179))
 COORDINATE = st.integers(-20_000, 20_000).map(lambda micrometre: micrometre * 1e-6)
 STEP = st.one_of(
     st.tuples(COORDINATE, COORDINATE, COORDINATE),

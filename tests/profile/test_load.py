@@ -39,7 +39,7 @@ def test_values_are_si():
     assert paper.geometry.pulley_radius == pytest.approx(0.011)
     assert paper.spring.stiffness == pytest.approx(1000.0)
     assert paper.extruder.pressure_max == pytest.approx(200e3)
-    assert paper.path.stop_angle == pytest.approx(2.6179938779914944)
+    assert paper.path.stop_angle == pytest.approx(3.12413936106985)
 
 
 def test_columns_differ_as_the_paper_says():
