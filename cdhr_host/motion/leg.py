@@ -200,8 +200,10 @@ class LegPlanner:
         if not len(found.start):
             return None
         speeds, forward = border_speeds(found, self._entry, 0.0)
-        self._check_entry(speeds[0])
-        count = len(found.start) if closes else _settled(found, forward)
+        slower = bool(speeds[0] < self._entry * (1 - 1e-9))
+        if closes and slower:
+            raise self._too_fast(speeds[0])
+        count = len(found.start) if closes else 0 if slower else _settled(found, forward)
         if count == 0:
             return None
         law = time_law(found.only(slice(count)), speeds[: count + 1])
@@ -265,17 +267,16 @@ class LegPlanner:
         room = max(float(way(np.array(speed), limits.acceleration, limits.jerk)), 2 * limits.half_width)
         return 3 * room + 2 * reach(limits.half_width)
 
-    def _check_entry(self, speed: float) -> None:
-        if speed < self._entry * (1 - 1e-9):
-            assert self._segments is not None
-            raise MotionError(
-                Problem(
-                    "unplannable",
-                    f"cannot slow down from {self._entry / MM:.6g} to {speed / MM:.6g} mm/s in time",
-                    line=int(self._segments.line[0]),
-                    hint="please report this as a bug, with the program",
-                )
+    def _too_fast(self, speed: float) -> MotionError:
+        assert self._segments is not None
+        return MotionError(
+            Problem(
+                "unplannable",
+                f"cannot slow down from {self._entry / MM:.6g} to {speed / MM:.6g} mm/s in time",
+                line=int(self._segments.line[0]),
+                hint="please report this as a bug, with the program",
             )
+        )
 
 
 def _settled(found: Cells, forward: Array) -> int:
