@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdhr_host.errors import MotionError, Problem
+from cdhr_host.motion.budget import Bends
 from cdhr_host.motion.cells import Cells, cells
 from cdhr_host.motion.corner import Allowance, reaches
 from cdhr_host.motion.flow import FlowLimits
@@ -106,6 +107,8 @@ class Leg:
     """A committed stretch: its path, the time law along it, and what the segments carry."""
 
     path: SmoothPath
+    bends: Bends
+    """of each piece of the path"""
     law: TimeLaw
     segments: Segments
     number: int = 0
@@ -171,8 +174,10 @@ class LegPlanner:
         if span[1] <= span[0]:
             return None
         feed, share = self._paces(segments)
+        bends = Bends.of(path)
         found = cells(
             path,
+            bends,
             feed[path.segment],
             span,
             self._limits,
@@ -186,7 +191,7 @@ class LegPlanner:
         if count == 0:
             return None
         law = time_law(found.only(slice(count)), speeds[: count + 1])
-        leg = Leg(path, law, segments, self._number, self._passed)
+        leg = Leg(path, bends, law, segments, self._number, self._passed)
         if not closes:
             self._advance(path, found, count, float(speeds[count]))
         return leg

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdhr_host.motion.budget import Bends
 from cdhr_host.motion.leg import Leg
-from cdhr_host.motion.smooth_path import SmoothPath
 from cdhr_host.pipeline.rig import Rig
 from cdhr_host.values import Array
 
@@ -47,9 +47,9 @@ class Turns:
         third = 6.0 * g**2 * upper.slope**3 + 3.0 * g * upper.slope * upper.bend + upper.twist
         return cls(second, third, third**2 / second)
 
-    def along(self, path: SmoothPath) -> Array:
+    def along(self, bends: Bends) -> Array:
         """(K,) 1/m³: bound of |f''''| on each piece of a path."""
-        bent, harder = path.bounds()
+        bent, harder = bends.second, bends.third
         turning = 6.0 * self.third * bent + self.second * (3.0 * bent**2 + 4.0 * harder)
         return np.asarray(self.fourth + turning, dtype=np.float64)
 
@@ -76,7 +76,7 @@ def places(leg: Leg, turns: Turns) -> Array:
     borders = np.append(start[inside], last)
     borders[0] = first
     widths = np.diff(borders)
-    asked = np.ceil(widths * (turns.along(leg.path)[inside] / (384.0 * NEAR)) ** 0.25)
+    asked = np.ceil(widths * (turns.along(leg.bends)[inside] / (384.0 * NEAR)) ** 0.25)
     count = np.maximum(asked, 1.0).astype(np.int64)
     whole = np.repeat(np.arange(len(count)), count)
     part = np.arange(len(whole)) - (np.cumsum(count) - count)[whole]
