@@ -25,7 +25,7 @@ from cdhr_host.values import Array, Flags, Ints
 
 SHAPED = 3.0
 """half-widths from a path's end in which corners are rounded less, to leave room for the stop"""
-BATCH = 2048
+BATCH = 4096
 """Segments collected before a plan is made."""
 MORE_ROOM = 0.5
 """Of the way that braking to rest takes, kept in hand when a leg is committed."""
