@@ -34,6 +34,8 @@ DRIVES = 6
 """exit code of a host whose drives did not answer: it is started again"""
 SETTLED = 20.0
 """s of a host's life from which on its memory is compared"""
+LIFE = 30
+"""seconds after that in which it must have lived on"""
 HOURLY = {"hold": 40, "override": 40, "interrupt": 5, "fault": 4, "stop": 4, "kill": 7}
 """how often each happens"""
 
@@ -79,7 +81,7 @@ class Memory(threading.Thread):
 
     def __init__(self, soak):
         super().__init__(daemon=True)
-        self._soak, self.far, self.hosts = soak, [], []
+        self._soak, self.far, self.hosts = soak, [], {}
 
     def run(self):
         while True:
@@ -88,11 +90,22 @@ class Memory(threading.Thread):
             if (far := resident(self._soak.far.process.pid)) is not None:
                 self.far.append((now, far))
             if host is not None and now - host.began > SETTLED and (kb := host.resident) is not None:
-                self.hosts.append((now, kb))
+                self.hosts.setdefault(host, []).append((now, kb))
+
+
+def grown(hosts):
+    """Of hosts that lived long enough, the greatest growth from their own first to last third, in percent."""
+    lives = [[kb for _, kb in samples] for samples in hosts.values() if len(samples) >= LIFE]
+    if not lives:
+        return None
+    thirds = [(np.median(kb[: len(kb) // 3]), np.median(kb[-(len(kb) // 3) :])) for kb in lives]
+    mb = [round(float(np.median(kb)) / 1024, 1) for kb in lives]
+    worst = max((last / first - 1.0 for first, last in thirds), key=abs)
+    return {"hosts": len(lives), "mb": [min(mb), max(mb)], "growth_percent": round(100 * worst, 2)}
 
 
 def growth(samples, parts=10):
-    """Medians of tenths of the time, MB, and how far the last is above the second, in percent."""
+    """Medians of tenths of the time, MB, and how far one is from their middle, in percent."""
     if len(samples) < 3 * parts:
         return None
     medians = [float(np.median([kb for _, kb in part])) for part in np.array_split(np.array(samples), parts)]
@@ -272,7 +285,7 @@ class Soak:
             **record,
             "seams": len(record["seams"]),
             "memory_far": growth(self.memory.far),
-            "memory_hosts": growth(self.memory.hosts),
+            "memory_hosts": grown(self.memory.hosts),
         }
 
     def say(self, code):

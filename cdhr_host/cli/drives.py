@@ -9,7 +9,7 @@ import typer
 
 from cdhr_host.cli.machine import open_machine
 from cdhr_host.cli.options import Json, ProfileName, examples
-from cdhr_host.cli.refusals import Refusal, emit
+from cdhr_host.cli.refusals import Refusal, emit, say
 
 if TYPE_CHECKING:
     from cdhr_host.drives.access import ObjectAccess
@@ -119,7 +119,7 @@ def home(*, drives: Url, profile: ProfileName = "paper") -> None:
     _real(drives)
     _expect_reference(profile, "homing", 'cdhr drives reference, or reference = "homing"')
     with _link(drives, profile) as link:
-        link.home()
+        link.home(lambda drive: say(f"homing drive {drive} of 6"))
     emit("six sliders homed, until the drives lose their power")
 
 

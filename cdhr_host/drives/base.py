@@ -3,7 +3,7 @@
 from typing import Final
 
 from cdhr_host.drives.buffer import RowBuffer
-from cdhr_host.drives.link import LinkState
+from cdhr_host.drives.link import LinkState, Told, untold
 from cdhr_host.drives.rows import joined, no_feedback
 from cdhr_host.drives.timing import CycleTiming
 from cdhr_host.errors import DriveError, Problem
@@ -53,7 +53,7 @@ class BufferedLink:
         """Absolute encoders know the reference pose."""
         return True
 
-    def home(self) -> None:
+    def home(self, told: Told = untold) -> None:  # noqa: ARG002
         """Nothing to find: the machine knows its reference pose."""
         self._expect(LinkState.OPEN, LinkState.STOPPED)
 

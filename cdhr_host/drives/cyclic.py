@@ -24,7 +24,7 @@ from cdhr_host.drives.canopen.scaling import Scaling
 from cdhr_host.drives.checks import check_standing
 from cdhr_host.drives.clock import Clock
 from cdhr_host.drives.faults import fault
-from cdhr_host.drives.link import LinkState
+from cdhr_host.drives.link import LinkState, Told, untold
 from cdhr_host.drives.reference import ReferenceStore
 from cdhr_host.drives.timing import CycleTiming
 from cdhr_host.drives.watch import first_fault, underrun
@@ -205,11 +205,11 @@ class CyclicLink(BufferedLink):
             return False
         return True
 
-    def home(self, should_stop: Callable[[], bool] | None = None) -> None:
+    def home(self, told: Told = untold, *, should_stop: Callable[[], bool] | None = None) -> None:
         """Reference every axis by homing, where the profile says so. OPEN or STOPPED only."""
         self._expect(LinkState.OPEN, LinkState.STOPPED)
         try:
-            self._reference.home(self.machine, should_stop or (lambda: self.interrupted))
+            self._reference.home(self.machine, should_stop or (lambda: self.interrupted), told)
         finally:
             self.interrupted = False
 

@@ -1,11 +1,19 @@
 """What every way to the drives offers."""
 
+from collections.abc import Callable
 from enum import Enum
 from typing import Protocol
 
 from cdhr_host.drives.timing import CycleTiming
 from cdhr_host.profile.schema import Profile
 from cdhr_host.values import Array, Feedback, Setpoints
+
+Told = Callable[[int], None]
+"""hears the number of a drive, 1 to 6"""
+
+
+def untold(drive: int) -> None:
+    """Nobody wants to know."""
 
 
 class LinkState(Enum):
@@ -92,11 +100,11 @@ class MachineLink(Protocol):
         """Whether every axis knows the reference pose; ``arm`` refuses otherwise. Not while CLOSED."""
         ...
 
-    def home(self) -> None:
+    def home(self, told: Told = untold) -> None:
         """Find the reference pose by the drives' homing, one slider after the other. OPEN or STOPPED.
 
-        Nothing to do where the profile's drives know it by themselves. Raises DriveError, also
-        once ``interrupt`` was called.
+        ``told`` hears the number of each drive as its turn comes. Nothing to do where the profile's
+        drives know it by themselves. Raises DriveError, also once ``interrupt`` was called.
         """
         ...
 

@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from cdhr_host.drives.link import MachineLink
+from cdhr_host.drives.link import MachineLink, Told, untold
 from cdhr_host.drives.reference import NEXT_STEP
 from cdhr_host.errors import JobError, MotionError, Problem
 from cdhr_host.job.aside import Aside
@@ -75,6 +75,7 @@ class Player:
         self.observers: list[Observer] = []
         self.referenced = False
         """whether the drives know where the machine stands"""
+        self.homing: Told = untold
         self._adopt()
 
     @property
@@ -114,11 +115,12 @@ class Player:
     def home(self) -> None:
         """Have drives find a reference pose that they do not know, one slider after the other.
 
-        Where the profile's drives are not homed, nothing happens. Raises DriveError.
+        ``homing`` hears each one's number as its turn comes. Where the profile's drives are not
+        homed, nothing happens. Raises DriveError.
         """
         if self.referenced or self.profile.canopen.reference != "homing":
             return
-        self.link.home()
+        self.link.home(self.homing)
         self.feeder.slider = np.zeros(6)
         self.staircase.stand_at(np.zeros(3), np.zeros(3))
         self._adopt()

@@ -35,6 +35,7 @@ from cdhr_host.values import Array, Pause
 LEAST, MOST = 0.01, 3.0
 """of an override"""
 BUG = "please report this as a bug, with the program"
+DRIVES = 6
 IDLE = 0.02
 """s of real time between two looks when nothing moves"""
 
@@ -64,6 +65,7 @@ class Printer:
         self._state = JobState.IDLE
         self._telling = Telling()
         self._acts = Acts(Player(link), clock, self._telling, self._happened, recorder)
+        self._acts.player.homing = self._homing
         self._typed = Typed(self._acts.player)
         self._jogging = Jogging(self._acts.player, clock, self._limit_met)
         self._sliding = Sliding(self._acts.player, partial(self._telling.add, "message"))
@@ -251,6 +253,11 @@ class Printer:
     def _slid(self, axis: int, distance: float) -> bool:
         self._check_still()
         return self._sliding.begin(axis, distance)
+
+    def _homing(self, drive: int) -> None:
+        """Told at once: homing holds up the turn it is in."""
+        self._telling.add("message", f"homing drive {drive} of {DRIVES}")
+        self._telling.tell(self.status)
 
     def _limit_met(self, limit: Problem) -> None:
         self._telling.add("message", f"the jog ends here: {limit.message}", limit)

@@ -34,7 +34,7 @@ from cdhr_host.values import Array, Setpoints
 SAME: Final = 0.02 * MM
 """how far the journal's nozzle may be from the plan's"""
 NEAR: Final = 0.3 * MM
-"""how far the nozzle may stand from the path and still count as on it"""
+"""how far the nozzle may stand from the path and still count as on it, where the axes stopped together"""
 FINE: Final = 0.5
 """ticks between places at which the nozzle is looked for"""
 BEGUN: Final = 2.0
@@ -185,13 +185,14 @@ class Resuming:
         end = max(float(self._end(course, reach)), last.plan_tick)
         tick = np.append(np.arange(last.plan_tick, end, FINE), end)
         away = np.linalg.norm(course.nozzle(tick).position_G - measured_G, axis=1)
-        if away.min() > NEAR:
-            found, limit = away.min() / MM, NEAR / MM
+        limit = self._astray(course, journal, (last.plan_tick, reach), stops)
+        if away.min() > limit:
+            found = f"{away.min() / MM:.2f} mm from the path it was on (limit {limit / MM:.2g} mm)"
             raise _refusal(
-                f"the nozzle stands {found:.2f} mm from the path it was on (limit {limit:g} mm)",
+                f"the nozzle stands {found}",
                 "if it was moved since, say --moved; if not, reference the machine",
             )
-        first, latest = _rested(away)
+        first, latest = _rested(away, max(NEAR, float(away.min())))
         if journal.state == "held" and tick[first] - last.plan_tick < 1.0:
             return last.plan_tick, last.plan_tick, float(away[first]), True
         begins = [
@@ -203,6 +204,24 @@ class Resuming:
         sure = begins[0] is not None and len(begins) == 1 and first == latest and as_links_do
         return max(bead, last.plan_tick), float(tick[latest]), float(away[first]), sure
 
+    def _astray(self, course: Course, journal: Journal, known: tuple[float, float], stops: Stops) -> float:
+        """m from its path at which the nozzle may stand; ``known`` are the last tick and the latest.
+
+        A drive that trips stops its own cable at once, and so does each brake by itself, while
+        the others may still go the way of a whole stop.
+        """
+        if journal.state != "fault" and not _cut(journal):
+            return NEAR
+        _, rows = self._played(course, known, max(journal.pace_most, 1.0))
+        steps = np.diff(stops(rows).nozzle_G, axis=0)
+        return NEAR + float(np.linalg.norm(steps, axis=1).sum())
+
+    def _played(self, course: Course, reach: tuple[float, float], pace: float) -> tuple[Array, Setpoints]:
+        """Ticks of the plan between two, as a pace plays them, and the rows there."""
+        rows = course.rows(math.floor(reach[0]), self._end(course, reach[1]))
+        tick = np.arange(float(rows.tick[0]), float(rows.tick[-1]), pace)
+        return tick, _between(rows, tick)
+
     def _end(self, course: Course, tick: float) -> int:
         """A tick, or that of the plan's next stop where it is earlier; the plan is made up to there."""
         course.plan(math.ceil(tick) + 1)
@@ -213,9 +232,8 @@ class Resuming:
         self, course: Course, reach: tuple[float, float], rested: float, pace: float, stops: Stops
     ) -> float | None:
         """Tick from which a link's own stop, at a pace of playback, ends at another; None where none does."""
-        rows = course.rows(math.floor(reach[0]), self._end(course, reach[1]))
-        tick = np.arange(float(rows.tick[0]), float(rows.tick[-1]), pace)
-        begin = _stop_begin(_between(rows, tick), int(np.abs(tick - rested).argmin()), stops)
+        tick, rows = self._played(course, reach, pace)
+        begin = _stop_begin(rows, int(np.abs(tick - rested).argmin()), stops)
         return None if begin is None else float(tick[begin])
 
     def _before(self, course: Course, tick: float, way: float) -> float:
@@ -246,9 +264,9 @@ def _cut(journal: Journal) -> bool:
     return journal.power_was_cut(boot_name())
 
 
-def _rested(away: Array) -> tuple[int, int]:
-    """(N,) m from a path's rows -> the rows nearest the first and the last time that it comes NEAR."""
-    near = np.flatnonzero(away <= NEAR)
+def _rested(away: Array, enough: float) -> tuple[int, int]:
+    """(N,) m from a path's rows -> the rows nearest the first and the last time that it comes near enough."""
+    near = np.flatnonzero(away <= enough)
     visits = np.split(near, np.flatnonzero(np.diff(near) > 1) + 1)
     first, latest = (visit[away[visit].argmin()] for visit in (visits[0], visits[-1]))
     return int(first), int(latest)

@@ -31,7 +31,7 @@ SHORTEST: Final = 4
 """ticks of a ramp"""
 LEAST: Final = 0.15
 """change of the rate that every ramp has room for: what landing on a whole tick needs"""
-SLACK: Final = 1.005
+SLACK: Final = 1.001
 """of the jerk, measured over three ticks, that counts as keeping its limit"""
 EASED: Final = 1.4
 """times the shortest ramp the air can follow where the plan's own flow is constant"""

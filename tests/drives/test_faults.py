@@ -190,7 +190,9 @@ def test_homing_references_one_slider_after_the_other(tmp_path):
         drive.home_at = 20_000
     with pytest.raises(DriveError, match="not referenced"):
         bench.link.arm(ZERO)
-    bench.link.home()
+    told = []
+    bench.link.home(told.append)
+    assert told == [1, 2, 3, 4, 5, 6]
     assert bench.far.state.slider == pytest.approx(np.full(6, 2e-3), abs=5e-5)
     assert all(drive.values[0x6061, 0] == 8 for drive in bench.far.drives)
     bench.link.arm(ZERO)

@@ -7,6 +7,7 @@ import pytest
 from stepped import Stepped
 
 from cdhr_host.drives import Loopback
+from cdhr_host.drives.link import Told, untold
 from cdhr_host.errors import JobError
 from cdhr_host.job.printer import Printer
 from cdhr_host.job.surface import JobState, Reply
@@ -31,8 +32,10 @@ class Lost(Loopback):
     def referenced(self) -> bool:
         return self.known
 
-    def home(self) -> None:
+    def home(self, told: Told = untold) -> None:
         self.homed += 1
+        for drive in range(1, 7):
+            told(drive)
         self.meanwhile()
         self.known = not self.interrupted
 
@@ -79,7 +82,11 @@ def test_nothing_moves_before_and_the_next_step_is_named(kind: str, step: str) -
 
 def test_g28_homes_the_drives_and_then_the_machine_moves() -> None:
     bench = Bench("homing")
+    told: list[str] = []
+    bench.printer.listen(lambda event: told.append(event.text))
+    bench.link.meanwhile = lambda: told.append("found")
     assert bench.run(" n1 g28 ; all of it").ok
+    assert told[:7] == [*(f"homing drive {drive} of 6" for drive in range(1, 7)), "found"]
     assert bench.link.homed == 1
     assert bench.printer.status().referenced
     assert bench.run("G1 X5 F600").ok

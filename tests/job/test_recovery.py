@@ -14,7 +14,7 @@ from cdhr_host.job.journal import Journal, read_journal
 from cdhr_host.job.printer import Printer
 from cdhr_host.job.program import Program, ProgramFile, proven
 from cdhr_host.job.recorder import Names, Recorder
-from cdhr_host.job.recovery import Recovery, Resuming, _rested
+from cdhr_host.job.recovery import NEAR, Recovery, Resuming, _rested
 from cdhr_host.job.surface import JobState
 from cdhr_host.pipeline import Staircase, open_profile
 from cdhr_host.pipeline.rig import Rig
@@ -225,7 +225,7 @@ def test_after_a_power_cut_the_disk_may_lack_a_second_and_the_drives_stopped_oth
 
 def test_a_path_that_comes_by_twice_goes_on_where_it_came_by_first() -> None:
     away = np.array([9.0, 0.2, 0.1, 0.25, 5.0, 5.0, 0.28, 0.05, 0.2, 7.0]) * MM
-    assert _rested(away) == (2, 7)
+    assert _rested(away, NEAR) == (2, 7)
 
 
 def test_a_machine_that_was_moved_is_refused(tmp_path: Path, program: Program) -> None:
@@ -234,6 +234,29 @@ def test_a_machine_that_was_moved_is_refused(tmp_path: Path, program: Program) -
     measured = RIG.standing(machine.link.slider)[0] + np.array([0.0, 0.0, 5.0]) * MM
     with pytest.raises(JobError, match=r"stands 5\.0"):
         Resuming(program, RIG).found(machine.journal, measured, machine.link.stop_rows, OVERLAP)
+
+
+def test_after_a_fault_the_nozzle_may_stand_off_its_path_by_the_way_of_a_stop(
+    tmp_path: Path, program: Program, whole: Setpoints
+) -> None:
+    """The drive that tripped held its cable while the others went on to rest."""
+    machine = interrupted(tmp_path, program, 15.0)
+    machine.link.open()
+    way, stops = Resuming(program, RIG), machine.link.stop_rows
+    journal = replace(machine.journal, state="fault")
+    assert journal.executed is not None
+    begin, slider = journal.executed.plan_tick, machine.link.slider.copy()
+    slider[2] = whole.slider[int(begin), 2]
+    measured = RIG.standing(slider)[0]
+    found = way.found(journal, measured, stops, OVERLAP)
+    assert NEAR < found.away < 3.0 * MM
+    assert not found.sure
+    assert found.tick < begin
+    assert found.overlap > OVERLAP + found.away
+    with pytest.raises(JobError, match=r"limit 0\.3 mm"):
+        way.found(machine.journal, measured, stops, OVERLAP)
+    with pytest.raises(JobError, match=r"stands 10"):
+        way.found(journal, measured + np.array([0.0, 0.0, 9.0]) * MM, stops, OVERLAP)
 
 
 def test_another_plan_is_refused(tmp_path: Path, program: Program) -> None:

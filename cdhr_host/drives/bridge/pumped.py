@@ -13,7 +13,7 @@ from cdhr_host.drives.bridge.host import BridgeLink
 from cdhr_host.drives.bridge.line import BridgeLine
 from cdhr_host.drives.bridge.talker import TURN
 from cdhr_host.drives.clock import MonotonicClock
-from cdhr_host.drives.link import LinkState
+from cdhr_host.drives.link import LinkState, Told, untold
 from cdhr_host.drives.timing import CycleTiming
 from cdhr_host.profile.schema import Profile
 from cdhr_host.values import Array, Feedback, Setpoints
@@ -86,10 +86,10 @@ class PumpedBridge:
         """The bridge's encoders are absolute."""
         return self._link.referenced
 
-    def home(self) -> None:
+    def home(self, told: Told = untold) -> None:
         """Nothing to find."""
         with self._lock:
-            self._link.home()
+            self._link.home(told)
 
     def interrupt(self) -> None:
         """Nothing to end."""

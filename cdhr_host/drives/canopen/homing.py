@@ -17,6 +17,7 @@ from cdhr_host.drives.canopen.machine import CanopenMachine
 from cdhr_host.drives.canopen.setup import CSP, HOMING, IP, set_mode
 from cdhr_host.drives.canopen.verified import read, verified
 from cdhr_host.drives.faults import fault
+from cdhr_host.drives.link import Told
 
 MARK: Final = 0x6081
 """profile velocity: cyclic modes do not use it, and it is lost with the drive's power"""
@@ -25,12 +26,13 @@ PATIENCE: Final = 120.0
 """s homing of an axis may take"""
 
 
-def home(machine: CanopenMachine, should_stop: Callable[[], bool]) -> None:
+def home(machine: CanopenMachine, should_stop: Callable[[], bool], told: Told) -> None:
     """Home all axes in turn with little torque; raises DriveError, with the axis at rest.
 
-    ``should_stop`` is asked in every cycle.
+    ``should_stop`` is asked in every cycle, ``told`` hears each drive's number as its turn comes.
     """
-    for axis in machine.axes:
+    for number, axis in enumerate(machine.axes, start=1):
+        told(number)
         _prepare(machine, axis)
         try:
             _home(machine, axis, should_stop)

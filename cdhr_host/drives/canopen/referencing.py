@@ -6,6 +6,7 @@ import numpy as np
 
 from cdhr_host.drives.canopen.homing import home, mark, marks
 from cdhr_host.drives.canopen.machine import CanopenMachine
+from cdhr_host.drives.link import Told
 from cdhr_host.drives.reference import ReferenceStore, unreferenced
 from cdhr_host.profile.schema import Profile
 from cdhr_host.values import Ints
@@ -39,14 +40,14 @@ class Referencing:
         elif self._mode == "homing" and not self._homed:
             raise unreferenced([1, 2, 3, 4, 5, 6], self._mode)
 
-    def home(self, machine: CanopenMachine, should_stop: Callable[[], bool]) -> None:
+    def home(self, machine: CanopenMachine, should_stop: Callable[[], bool], told: Told) -> None:
         """Mode 6, one slider at a time; nothing to do where the profile says otherwise.
 
         It holds as long as the drives have power: they keep a mark, and so does the store.
         """
         if self._mode == "homing":
             self._homed = False
-            home(machine, should_stop)
+            home(machine, should_stop, told)
             self._store.mark(self._profile, machine.found.serials, mark(machine))
             self._homed = True
             machine.watch.unreferenced.clear()

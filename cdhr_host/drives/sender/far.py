@@ -259,7 +259,10 @@ class Sender:
         return self._link.referenced
 
     def _do_home(self) -> None:
-        self._link.home(lambda: bool(self._status[Word.INTERRUPT]))
+        self._link.home(
+            lambda drive: self._commands.send(("homing", drive)),
+            should_stop=lambda: bool(self._status[Word.INTERRUPT]),
+        )
 
     def _do_reference(self) -> None:
         self._link.set_reference()

@@ -13,7 +13,7 @@ import numpy as np
 
 from cdhr_host.drives.checks import STANDS_WITHIN, check_rows, check_shapes
 from cdhr_host.drives.faults import fault
-from cdhr_host.drives.link import LinkState
+from cdhr_host.drives.link import LinkState, Told, untold
 from cdhr_host.drives.rows import no_feedback
 from cdhr_host.drives.sender.far import CAPACITY, NOWHERE, RESULTS, REVISION, STATES, Spec, Word, run
 from cdhr_host.drives.sender.ring import FEEDBACK, SETPOINTS, Ring, feedback, packed, width
@@ -164,10 +164,10 @@ class SenderLink:
         """Whether every axis knows the reference pose."""
         return bool(self._ask("referenced"))
 
-    def home(self) -> None:
+    def home(self, told: Told = untold) -> None:
         """Reference every axis by homing, one after the other."""
         try:
-            self._ask("home")
+            self._ask("home", told=told)
         finally:
             self._status[Word.INTERRUPT] = 0
 
@@ -235,7 +235,7 @@ class SenderLink:
         for ring in (self._rows, self._results, self._revisions):
             ring.unlink()
 
-    def _ask(self, name: str, *arguments: Any) -> Any:
+    def _ask(self, name: str, *arguments: Any, told: Told = untold) -> Any:
         """A command and its answer; raises DriveError when it is refused or the sender is dead."""
         if self._process is None:
             raise DriveError(Problem("state", "the drives are closed, not open"))
@@ -245,10 +245,12 @@ class SenderLink:
                 if not self._pipe.poll(ANSWER):
                     raise self._dead("does not answer")
                 kind, answer = self._pipe.recv()
-                if kind == "fault":
+                if kind == "homing":
+                    told(answer)
+                elif kind == "fault":
                     self._fault, self._untold = DriveError(answer), True
-                    continue
-                break
+                else:
+                    break
         except (EOFError, OSError) as error:
             raise self._dead("ended") from error
         self._read_status()
