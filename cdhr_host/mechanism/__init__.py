@@ -20,7 +20,14 @@ from cdhr_host.mechanism.dynamics import (
 from cdhr_host.mechanism.force_room import Swings, swings
 from cdhr_host.mechanism.forward import forward, mistaken_error, model_errors, uncompensated_error
 from cdhr_host.mechanism.frequencies import elastic_frequencies, swinging_frequencies
-from cdhr_host.mechanism.kinematics import jacobian, lengths, reachable, slider, uncompensated_lengths
+from cdhr_host.mechanism.kinematics import (
+    jacobian,
+    lengths,
+    lengths_and_rates,
+    reachable,
+    slider,
+    uncompensated_lengths,
+)
 from cdhr_host.mechanism.pairs import (
     Pairs,
     Shares,
@@ -72,6 +79,7 @@ __all__ = [
     "inconsistencies",
     "jacobian",
     "lengths",
+    "lengths_and_rates",
     "mistaken_error",
     "model_errors",
     "moment_matrix",

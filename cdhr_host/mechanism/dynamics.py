@@ -3,15 +3,16 @@
 All of it treats the platforms as two points, each with three cables, and the spring between them.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from cdhr_host.mechanism.cables import GRAVITY, LOWER, UPPER, Cables, Loads
 from cdhr_host.mechanism.kinematics import blocks, components, jacobian
-from cdhr_host.mechanism.pairs import Pairs, left_shares
+from cdhr_host.mechanism.pairs import Pairs, sharing
 from cdhr_host.mechanism.pulley import Vector, Wrap
-from cdhr_host.mechanism.statics import spring_force, tensions
+from cdhr_host.mechanism.statics import answers, carried, spring_force, tensions
 from cdhr_host.values import Array
 
 UNITS = np.eye(3)
@@ -54,34 +55,42 @@ def accelerations(
 
 def affine_tensions(cables: Cables, loads: Loads, lower: Array, upper: Array) -> AffineTensions:
     """(N, 3), (N, 3) -> AffineTensions of the six equivalent cables. Raises like ``tensions``."""
-    rest = tensions(cables, loads, lower, upper)
-    pulls = -jacobian(cables, lower, upper).transpose(0, 2, 1)
-    below, above = _inverse(pulls[:, :, :3]), _inverse(pulls[:, :, 3:])
-    return AffineTensions(rest, loads.lower_mass * below, loads.upper_mass * above)
+    rest, below, above = (np.empty((*shape, len(lower))) for shape in ((6,), (3, 3), (3, 3)))
+    for rows, wraps in blocks(cables, lower, upper):
+        rest[:, rows] = _resting(loads, wraps, lower, upper, rows)
+        below[:, :, rows], above[:, :, rows] = _gains(loads, wraps, rows.start)
+    return AffineTensions(rest.T, below.transpose(2, 0, 1), above.transpose(2, 0, 1))
 
 
 def affine_nine_tensions(  # noqa: PLR0917 -- the order of nine_tensions
     cables: Cables, loads: Loads, pairs: Pairs, lower: Array, upper: Array, moment: Array | None = None
 ) -> AffineTensions:
     """As ``affine_tensions`` for left 1-3, right 1-3, upper 4-6. Raises like ``nine_tensions``."""
-    six = affine_tensions(cables, loads, lower, upper)
-    rest, gain = np.empty((len(lower), 3)), np.empty((len(lower), 3, 3))
+    rest, below, above = (np.empty((*shape, len(lower))) for shape in ((9,), (6, 3), (3, 3)))
     for rows, wraps in blocks(cables, lower, upper):
-        below = wraps[:3]
-        outside = None if moment is None else components(moment, rows)
-        for i, part in enumerate(
-            left_shares(pairs, below, components(six.rest[:, :3], rows), outside, rows.start)
-        ):
-            rest[rows, i] = part
-        for axis in range(3):
-            column = components(six.lower[:, :, axis], rows)
-            for i, part in enumerate(left_shares(pairs, below, column, None, rows.start)):
-                gain[rows, i, axis] = part
-    return AffineTensions(
-        np.hstack([rest, six.rest[:, :3] - rest, six.rest[:, 3:]]),
-        np.concatenate([gain, six.lower - gain], axis=1),
-        six.upper,
-    )
+        six = _resting(loads, wraps, lower, upper, rows)
+        by_force, by_moment = sharing(pairs, wraps[:3], rows.start)
+        left = np.einsum("ijn,jn->in", by_force, six[:3])
+        if moment is not None:
+            left += np.einsum("ijn,nj->in", by_moment, moment[rows])
+        rest[:, rows] = np.concatenate((left, six[:3] - left, six[3:]))
+        whole, above[:, :, rows] = _gains(loads, wraps, rows.start)
+        part = np.einsum("ijn,jkn->ikn", by_force, whole)
+        below[:3, :, rows], below[3:, :, rows] = part, whole - part
+    return AffineTensions(rest.T, below.transpose(2, 0, 1), above.transpose(2, 0, 1))
+
+
+def _resting(loads: Loads, wraps: Sequence[Wrap], lower: Array, upper: Array, rows: slice) -> Array:
+    """(6, N) N at rest, in some rows of the samples."""
+    places = components(lower, rows), components(upper, rows)
+    still = np.zeros_like(places[0])
+    x, y, z = still
+    return np.array(carried(loads, wraps, places, ((x, y, z), (x, y, z)), rows.start))
+
+
+def _gains(loads: Loads, wraps: Sequence[Wrap], start: int) -> tuple[Array, Array]:
+    """(3, 3, N) kg each: of the lower and the upper cables, by their platform's acceleration."""
+    return loads.lower_mass * answers(wraps[:3], start), loads.upper_mass * answers(wraps[3:], start)
 
 
 def tension_slopes(  # noqa: PLR0917 -- the order of Eq. (11)

@@ -1,6 +1,6 @@
 """Quantities along a motion: value, rate and second derivative, carried through sums and products.
 
-Where nothing but the values is wanted, ``Plain`` carries these alone through the same formulas.
+``Slope`` carries no second derivative through the same formulas, ``Plain`` nothing but the values.
 """
 
 from typing import NamedTuple, TypeVar
@@ -48,6 +48,34 @@ class Jet(NamedTuple):
         )
 
 
+class Slope(NamedTuple):
+    """Value and rate, as a Jet has them."""
+
+    value: Array
+    rate: Array
+
+    def plus(self, other: "Slope") -> "Slope":
+        """Sum."""
+        return Slope(self.value + other.value, self.rate + other.rate)
+
+    def times(self, other: "Slope") -> "Slope":
+        """Product."""
+        return Slope(self.value * other.value, self.rate * other.value + self.value * other.rate)
+
+    def scaled(self, factor: float) -> "Slope":
+        """Times a constant."""
+        return Slope(self.value * factor, self.rate * factor)
+
+    def shifted(self, constant: float) -> "Slope":
+        """Plus a constant."""
+        return Slope(self.value + constant, self.rate)
+
+    def inverse_root(self) -> "Slope":
+        """To the power of -1/2."""
+        root = 1.0 / np.sqrt(self.value)
+        return Slope(root, -0.5 * root / self.value * self.rate)
+
+
 class Plain(NamedTuple):
     """Values only, as a Jet has them."""
 
@@ -74,7 +102,7 @@ class Plain(NamedTuple):
         return Plain(1.0 / np.sqrt(self.value))
 
 
-Along = TypeVar("Along", Jet, Plain)
+Along = TypeVar("Along", Jet, Slope, Plain)
 """With derivatives or without."""
 
 

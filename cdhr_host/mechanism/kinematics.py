@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.mechanism.cables import LOWER, UPPER, Cables
-from cdhr_host.mechanism.pulley import PointWrap, Vector, Wrap
+from cdhr_host.mechanism.pulley import PointWrap, Vector, Wrap, dot
 from cdhr_host.units import MM
 from cdhr_host.values import Array
 
 BLOCK = 4096
 """samples worked on at a time"""
+Motion = tuple[Array, Array]
+"""displacement, m, and velocity, m/s, of a platform, (N, 3) each"""
 
 
 def lengths(cables: Cables, lower: Array, upper: Array) -> Array:
@@ -28,6 +30,20 @@ def lengths(cables: Cables, lower: Array, upper: Array) -> Array:
         for i, wrap in enumerate(wraps):
             found[rows, i] = wrap.length()
     return found
+
+
+def lengths_and_rates(cables: Cables, lower: Motion, upper: Motion) -> tuple[Array, Array]:
+    """Displacements and velocities (N, 3) of the platforms -> lengths, m, and their rates, m/s, (N, 6).
+
+    l' = -e·v. Raises like ``lengths``.
+    """
+    length, rate = np.empty((2, len(lower[0]), 6))
+    for rows, wraps in blocks(cables, lower[0], upper[0]):
+        velocities = components(lower[1], rows), components(upper[1], rows)
+        for i, wrap in enumerate(wraps):
+            length[rows, i] = wrap.length()
+            rate[rows, i] = -dot(wrap.direction(), velocities[0 if i in LOWER else 1])
+    return length, rate
 
 
 def uncompensated_lengths(cables: Cables, lower: Array, upper: Array) -> Array:

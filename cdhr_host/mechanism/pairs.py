@@ -155,18 +155,37 @@ def left_shares(
 
     ``start`` is the number of the first sample, for the error's words.
     """
-    columns = _spread(pairs, wraps)
-    first, second, third, det = cofactors(*columns)
-    _require_regular(columns, det, start)
-    needed = [
-        scaled(cross(arm, wrap.direction()), part)
-        for arm, wrap, part in zip(_rows(pairs.right), wraps, force, strict=True)
-    ]
+    first, second, third, det = _regular(pairs, wraps, start)
+    needed = [scaled(arm, part) for arm, part in zip(_moments(pairs, wraps), force, strict=True)]
     if moment is not None:
         needed.append(moment)
     x, y, z = (sum(parts[1:], parts[0]) for parts in zip(*needed, strict=True))
     total = x / det, y / det, z / det
     return dot(first, total), dot(second, total), dot(third, total)
+
+
+def sharing(pairs: Pairs, wraps: Sequence[Wrap], start: int) -> tuple[Array, Array]:
+    """Three lower cables -> (3, 3, N) of the pairs' forces, (3, 3, N) 1/m of an outside moment.
+
+    Their products with these add up to the forces of the left ones, as ``left_shares`` has them.
+    """
+    *vectors, det = _regular(pairs, wraps, start)
+    by_moment = np.asarray(np.array(vectors) / det, dtype=np.float64)
+    by_force = np.einsum("ijn,kjn->ikn", by_moment, np.array(_moments(pairs, wraps)))
+    return np.asarray(by_force, dtype=np.float64), by_moment
+
+
+def _regular(pairs: Pairs, wraps: Sequence[Wrap], start: int) -> tuple[Vector, Vector, Vector, Array]:
+    """Cofactors and determinant of D; raises MotionError where it is nearly singular."""
+    columns = _spread(pairs, wraps)
+    first, second, third, det = cofactors(*columns)
+    _require_regular(columns, det, start)
+    return first, second, third, det
+
+
+def _moments(pairs: Pairs, wraps: Sequence[Wrap]) -> list[Vector]:
+    """The columns of D_r: r_ir x e_i, m."""
+    return [cross(arm, wrap.direction()) for arm, wrap in zip(_rows(pairs.right), wraps, strict=True)]
 
 
 def _spread(pairs: Pairs, wraps: Sequence[Wrap]) -> list[Vector]:

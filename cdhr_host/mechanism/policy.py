@@ -71,6 +71,18 @@ class Policy:
                 np.add(q[axis], part.value, out=place[rows, axis])
         return place
 
+    def moving(self, lower: Array, velocity: Array) -> tuple[Array, Array]:
+        """(N, 3) m, (N, 3) m/s of the lower platform -> the same of the upper one, velocity exact."""
+        if self.field is None:
+            return self.upper(lower), velocity
+        moved = np.empty_like(lower), np.empty_like(lower)
+        for rows in block_rows(len(lower)):
+            motion = components(lower, rows), components(velocity, rows)
+            for axis, slope in enumerate(_offset(self.loads, self.field.sloping(*motion))):
+                for order, part in enumerate(slope):
+                    np.add(motion[order][axis], part, out=moved[order][rows, axis])
+        return moved
+
     def follow(self, lower: Array, velocity: Array, acceleration: Array) -> UpperMotion:
         """(N, 3) each of the lower platform, m, m/s, m/s² -> UpperMotion, with exact derivatives."""
         if self.field is None:

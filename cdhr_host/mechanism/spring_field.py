@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdhr_host.mechanism.jet import Along, Jet, Plain, constant
+from cdhr_host.mechanism.jet import Along, Jet, Plain, Slope, constant
 from cdhr_host.mechanism.pulley import Vector
 from cdhr_host.values import Array
 
@@ -60,6 +60,11 @@ class SpringField:
     def along(self, place: Vector, speed: Vector, change: Vector) -> tuple[Jet, Jet, Jet]:
         """Position, velocity and acceleration of the lower platform -> force, N, with its derivatives."""
         x, y, z = (Jet(*parts) for parts in zip(place, speed, change, strict=True))
+        return self._force(x, y, z)
+
+    def sloping(self, place: Vector, speed: Vector) -> tuple[Slope, Slope, Slope]:
+        """Position and velocity of the lower platform -> force, N, with its rate."""
+        x, y, z = (Slope(*parts) for parts in zip(place, speed, strict=True))
         return self._force(x, y, z)
 
     def at(self, place: Vector) -> tuple[Plain, Plain, Plain]:

@@ -31,7 +31,7 @@ AZIMUTHS: Final = np.linspace(0.0, 60.0, 5) * DEG
 HEIGHTS: Final = 26
 NEAR: Final = 0.06
 """a margin this far below zero counts as beyond what is possible"""
-PIECE: Final = 24
+PIECE: Final = 48
 """rows of a product done at once"""
 DAMPINGS: Final = 8
 """tries of a Newton step, each damped six times as much"""
@@ -82,7 +82,7 @@ class _Fit:
         hessian = self._hessian(self.weight[:, None, None] * (curve + 1e-7 * np.eye(3)))
         scale = float(np.diag(hessian).mean()) * np.eye(len(coefficients))
         for _ in range(DAMPINGS):
-            trial = coefficients - _solved(hessian + self.damping * scale, gradient)
+            trial = coefficients - np.linalg.solve(hessian + self.damping * scale, gradient)
             if self.worst(trial, sharpness)[0] < value:
                 self.damping = max(self.damping / 6.0, 1e-7)
                 return trial
@@ -145,17 +145,6 @@ def _pieces(rows: Array) -> Array:
     filled = np.zeros((count * PIECE, width))
     filled[: len(rows)] = rows
     return filled.reshape(count, PIECE, width)
-
-
-def _solved(matrix: Array, vector: Array) -> Array:
-    """matrix⁻¹ vector of a positive definite matrix by elimination, on one core like ``_product``."""
-    work = np.column_stack([matrix, vector])
-    for k in range(len(vector) - 1):
-        work[k + 1 :, k:] -= np.multiply.outer(work[k + 1 :, k] / work[k, k], work[k, k:])
-    found = np.zeros_like(vector)
-    for k in reversed(range(len(vector))):
-        found[k] = (work[k, -1] - (work[k, k:-1] * found[k:]).sum()) / work[k, k]
-    return found
 
 
 def whole_machine(cables: Cables) -> Domain:

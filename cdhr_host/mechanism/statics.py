@@ -87,8 +87,23 @@ def cofactors(a: Vector, b: Vector, c: Vector) -> tuple[Vector, Vector, Vector, 
     return first, cross(c, a), cross(a, b), dot(a, first)
 
 
+def answers(wraps: Sequence[Wrap], start: int) -> Array:
+    """Three cables -> (3, 3, N): three vectors, whose products with a force are the tensions that give it.
+
+    ``start`` as for ``carried``; raises MotionError where the cables lie in one plane.
+    """
+    *vectors, det = _regular(wraps, start)
+    return np.asarray(np.array(vectors) / det, dtype=np.float64)
+
+
 def _pull(wraps: Sequence[Wrap], force: Vector, start: int) -> tuple[Array, Array, Array]:
     """Three cables and the force they give together -> their tensions."""
+    first, second, third, det = _regular(wraps, start)
+    return dot(first, force) / det, dot(second, force) / det, dot(third, force) / det
+
+
+def _regular(wraps: Sequence[Wrap], start: int) -> tuple[Vector, Vector, Vector, Array]:
+    """Cofactors and determinant of three cables' directions."""
     first, second, third, det = cofactors(*(wrap.direction() for wrap in wraps))
     if not np.abs(det).min() > LEAST_DETERMINANT:
         sample = start + int(np.abs(det).argmin())
@@ -101,4 +116,4 @@ def _pull(wraps: Sequence[Wrap], force: Vector, start: int) -> tuple[Array, Arra
                 hint="keep away from the plane of the pulleys",
             )
         )
-    return dot(first, force) / det, dot(second, force) / det, dot(third, force) / det
+    return first, second, third, det

@@ -39,7 +39,7 @@ def leg_bounds(leg: Leg) -> LegBounds:
     harshest = np.maximum(np.abs(change), np.abs(change + after * jerk))
     reached = np.clip((start, np.append(start[1:], leg.law.end)), *leg.law.within)
     rows = _overlapped(leg.path.start, *reached)
-    bends = Bends(*(_largest(row, rows) for row in (*leg.path.bounds(), *leg.path.along())))
+    bends = Bends(*(_largest(row, rows) for row in leg.bends.rows))
     segment = leg.path.segment
     feed = -_largest(-leg.segments.feed[segment], rows)
     flow = _largest(leg.segments.clay[segment], rows) * fastest

@@ -53,14 +53,15 @@ class Bends:
 
     def only(self, which: Ints) -> "Bends":
         """Of some of the stretches."""
-        return Bends(*(row[which] for row in self._rows))
+        return Bends(*(row[which] for row in self.rows))
 
     def largest(self, heads: Ints) -> "Bends":
         """Of rows of stretches, each from one of ``heads`` to before the next."""
-        return Bends(*(np.maximum.reduceat(row, heads) for row in self._rows))
+        return Bends(*(np.maximum.reduceat(row, heads) for row in self.rows))
 
     @property
-    def _rows(self) -> tuple[Array, Array, Array, Array]:
+    def rows(self) -> tuple[Array, Array, Array, Array]:
+        """All four."""
         return self.second, self.third, self.along_second, self.along_third
 
     def acceleration(self, v: Array, a: Array) -> Array:

@@ -99,6 +99,7 @@ class _Stretches:
 
 def cells(
     path: SmoothPath,
+    bends: Bends,
     feed: Array,
     span: tuple[float, float],
     limits: MotionLimits,
@@ -117,7 +118,7 @@ def cells(
     what could be braked from a border still can.
     """
     h = limits.half_width
-    pieces = _between(path, (np.minimum(feed, limits.speed), *share), span, h, long)
+    pieces = _between(path, bends, (np.minimum(feed, limits.speed), *share), span, h=h, at_ends=long)
     rows = _rows(pieces, h, passed)
     cap = np.minimum(rows.cap, _pushed_speed(rows, limits))
     speed, spent = shares(cap, rows.room, rows.bends, rows.long, rows.braked, limits)
@@ -159,8 +160,10 @@ def _pulls(brake: Array) -> Array:
 
 def _between(
     path: SmoothPath,
+    bends: Bends,
     wanted: tuple[Array, Array, Array],
     span: tuple[float, float],
+    *,
     h: float,
     at_ends: tuple[float, float],
 ) -> _Stretches:
@@ -178,9 +181,8 @@ def _between(
     long = bent & (np.add.reduceat(length, heads)[run] > LONG_RUN * h)
     begins, finishes = start[heads][run], np.append(start[heads[1:]], span[1])[run]
     long |= bent & ((begins <= span[0] + at_ends[0]) | (finishes >= span[1] - at_ends[1]))
-    bends = Bends.of(path).only(used)
     return _Stretches(
-        start, length, feed[used], share[used], room[used], bends, bent, brake, run, long & ~braked
+        start, length, feed[used], share[used], room[used], bends.only(used), bent, brake, run, long & ~braked
     )
 
 

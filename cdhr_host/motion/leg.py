@@ -15,6 +15,7 @@ import numpy as np
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.motion.approach import reach, straightened
 from cdhr_host.motion.beside import Allowance, norms, way
+from cdhr_host.motion.budget import Bends
 from cdhr_host.motion.cells import TOUCHING, Cells, cells
 from cdhr_host.motion.flow import FlowLimits
 from cdhr_host.motion.limits import MotionLimits
@@ -24,7 +25,7 @@ from cdhr_host.motion.time_law import TimeLaw, time_law
 from cdhr_host.units import MM
 from cdhr_host.values import Array, Ints
 
-BATCH = 2048
+BATCH = 4096
 """Segments collected before a plan is made."""
 
 
@@ -104,6 +105,8 @@ class Leg:
     """A committed stretch: its path, the time law along it, and what the segments carry."""
 
     path: SmoothPath
+    bends: Bends
+    """of each piece of the path"""
     law: TimeLaw
     segments: Segments
     number: int = 0
@@ -185,8 +188,10 @@ class LegPlanner:
         if span[1] <= span[0]:
             return None
         feed, share = self._paces(segments)
+        bends = Bends.of(path)
         found = cells(
             path,
+            bends,
             feed[path.segment],
             span,
             self._limits,
@@ -207,7 +212,7 @@ class LegPlanner:
         if count == 0:
             return None
         law = time_law(found.only(slice(count)), speeds[: count + 1])
-        leg = Leg(path, law, segments, self._number, passed)
+        leg = Leg(path, bends, law, segments, self._number, passed)
         if not closes:
             self._advance(path, found, count, passed)
             self._entry = float(speeds[count])

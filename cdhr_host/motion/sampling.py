@@ -47,7 +47,12 @@ class Laid:
         """(N,) ticks, and the times (N,) s at which this stretch is asked for them."""
         if isinstance(self.stretch, Stand):
             return _standing(self.stretch, tick)
-        return _moving(self.stretch, tick, np.clip(t - self.begin, 0.0, self.stretch.duration))
+        return _moving(self.stretch, tick, self.elapsed(t))
+
+    def elapsed(self, t: Array) -> Array:
+        """(N,) s -> (N,) s since the stretch began, but never before it or after its end."""
+        since: Array = np.clip(t - self.begin, 0.0, self.stretch.duration)
+        return since
 
 
 @dataclass(frozen=True, slots=True)

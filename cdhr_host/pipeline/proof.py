@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import singledispatchmethod
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from cdhr_host.pipeline.leading import Leading
 from cdhr_host.pipeline.shift import Shift
 from cdhr_host.pipeline.staircase import Checked, Staircase
 from cdhr_host.pipeline.survey import Survey
-from cdhr_host.pipeline.trace import Trace, Tracer
+from cdhr_host.pipeline.trace import Trace
 from cdhr_host.profile import Profile
 from cdhr_host.values import (
     Arc,
@@ -34,6 +35,9 @@ from cdhr_host.values import (
     Stop,
     ToolTrack,
 )
+
+if TYPE_CHECKING:
+    from cdhr_host.pipeline.tracer import Tracer
 
 Extreme = tuple[float, int, float, int]
 """least, its line, greatest, its line"""
@@ -89,7 +93,7 @@ def prove(
     staircase = Staircase(profile, rate_hz=rate_hz)
     chosen = Survey(staircase.rig).tracks if sink is None else Timed.tracks
     clearing, tally = Clearing(profile), _Tally()
-    tracer = Tracer(staircase.rig, staircase.period)
+    tracer = None if trace is None else _tracer(staircase)
 
     def seen(steps: Iterable[Command | Checked]) -> None:
         for step in steps:
@@ -113,13 +117,20 @@ def prove(
         if isinstance(step, Timed | Shift):
             for checked in _computed(staircase, step, chosen):
                 seen(leading.push(checked))
-            kept(tracer.traces(step))
+            kept(tracer.traces(step) if tracer else ())
         else:
             seen(leading.push(step))
-            kept(tracer.command(step))
+            kept(tracer.command(step) if tracer else ())
     seen(leading.finish())
-    kept(tracer.finish())
+    kept(tracer.finish() if tracer else ())
     return tally.proof(staircase, clearing.warning)
+
+
+def _tracer(staircase: Staircase) -> "Tracer":
+    """Loads a compiler, which nothing else here needs."""
+    from cdhr_host.pipeline.tracer import Tracer  # noqa: PLC0415
+
+    return Tracer(staircase.rig, staircase.period)
 
 
 def _computed(

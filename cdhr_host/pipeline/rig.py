@@ -16,6 +16,7 @@ from cdhr_host.mechanism import (
     direction_change_bound,
     forward,
     lengths,
+    lengths_and_rates,
     nine_tensions,
     slider,
     stretched_forward,
@@ -117,6 +118,12 @@ class Rig:
             return self.shifted_sliders(track, self.follow(track)[1])
         q = track.position_G - self.cables.reference_G
         return slider(self.cables, lengths(self.cables, q, self.policy.upper(q)))
+
+    def slider_motion(self, position_G: Array, velocity: Array) -> tuple[Array, Array]:
+        """(N, 3) m, (N, 3) m/s of the nozzle -> (N, 6) m, (N, 6) m/s of sliders that allow for no stretch."""
+        q = position_G - self.cables.reference_G
+        length, rate = lengths_and_rates(self.cables, (q, velocity), self.policy.moving(q, velocity))
+        return slider(self.cables, length), rate
 
     def shifted_sliders(self, track: ToolTrack, upper: UpperMotion) -> Array:
         """The same for an upper platform with a motion of its own."""

@@ -47,11 +47,13 @@ class Survey:
 
     def tracks(self, timed: Timed) -> Iterator[ToolTrack]:
         """Samples of a stretch that prove all of it, in blocks."""
-        ticks = self._ticks(timed)
-        for first in range(0, len(ticks), BLOCK):
-            yield timed.track(ticks[first : first + BLOCK])
+        looks = self._looks(timed)
+        count = len(looks.tick) if isinstance(looks, ToolTrack) else len(looks)
+        for rows in (slice(first, first + BLOCK) for first in range(0, count, BLOCK)):
+            yield looks[rows] if isinstance(looks, ToolTrack) else timed.track(looks[rows])
 
-    def _ticks(self, timed: Timed) -> Ints:
+    def _looks(self, timed: Timed) -> Ints | ToolTrack:
+        """Ticks, or the samples at them where these are known already."""
         every = timed.ticks
         if len(every) <= 2:
             return np.arange(every.start, every.stop)
@@ -62,8 +64,9 @@ class Survey:
             return np.arange(every.start, every.stop)
         stride = max(1, int(SPACING / (found.speed * timed.period)))
         coarse = np.append(np.arange(every.start, every.stop - 1, stride), every.stop - 1)
-        certain = self._certain(timed.track(coarse), found)
-        return _refined(coarse, certain[:-1] & certain[1:])
+        track = timed.track(coarse)
+        certain = self._certain(track, found)
+        return track if certain.all() else _refined(coarse, certain[:-1] & certain[1:])
 
     def _within(self, leg: Leg, found: LegBounds) -> bool:
         """Whether bounds alone keep a leg on the bed and inside the limits of nozzle, sliders and air."""
@@ -86,8 +89,8 @@ class Survey:
     def _certain(self, track: ToolTrack, found: LegBounds) -> Flags:
         """(N,) whether forces and travel are proven between here and a neighbour that is certain too."""
         rig = self._rig
-        q, upper = rig.follow(track)
-        forces = swings(rig.cables, rig.loads, rig.pairs, q, upper.place)
+        q = track.position_G - rig.cables.reference_G
+        forces = swings(rig.cables, rig.loads, rig.pairs, q, rig.policy.upper(q))
         hard = rig.upper.slope * found.acceleration + rig.upper.bend * found.speed**2
         swing = forces.by(found.acceleration, hard)
         pulled = (forces.rest - swing >= self._least) & (forces.rest + swing <= self._greatest)
@@ -119,8 +122,6 @@ def _resting(rig: Rig, q: Array) -> Array:
 
 def _refined(coarse: Ints, proven: Flags) -> Ints:
     """Coarse ticks (N,), with every tick in between where an interval (N-1,) is not proven."""
-    if proven.all():
-        return coarse
     count = np.where(proven, 1, np.diff(coarse))
     start = np.repeat(coarse[:-1], count)
     within = np.arange(len(start)) - np.repeat(np.cumsum(count) - count, count)

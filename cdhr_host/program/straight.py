@@ -59,8 +59,7 @@ def resolve(modal: Modal, rows: Sequence[Row]) -> Steps:
     """Absolute positions, feeds and clay of rows. Pure: same modal and rows, same result."""
     _, early_f, early_z, x, y, z, e, f, _ = zip(*rows, strict=True)
     count = len(rows)
-    feeds = _numbers([early or late for early, late in zip(early_f, f, strict=True)])
-    heights = _numbers([early or late for early, late in zip(early_z, z, strict=True)])
+    feeds, heights = _numbers(_either(early_f, f)), _numbers(_either(early_z, z))
     before = math.nan if modal.feed is None else modal.feed
     feed = np.full(count, before) if feeds is None else _held(feeds * modal.unit / MINUTE, before)
     points = np.empty((count + 1, 3))
@@ -139,10 +138,19 @@ def _moves(
     )
 
 
+def _either(early: Sequence[str], late: Sequence[str]) -> Sequence[str]:
+    """Each word where it stands, in one of its two places."""
+    if not any(early):
+        return late
+    return [first or second for first, second in zip(early, late, strict=True)]
+
+
 def _numbers(texts: Sequence[str]) -> Array | None:
     """(N,) numbers with NaN where there is none; None when there is none at all."""
     if not any(texts):
         return None
+    if all(texts):
+        return np.array(list(map(float, texts)))
     return np.array([float(text) if text else math.nan for text in texts])
 
 

@@ -113,16 +113,17 @@ class Log:
         self._held.append(batch)
         self._rows += batch.num_rows
         if self._rows >= ROW_GROUP:
-            self._flush()
+            self.flush()
 
-    def _flush(self) -> None:
+    def flush(self) -> None:
+        """Write the rows that are held."""
         if self._rows:
             self._writer.write(pa.Table.from_batches(self._held, self._schema).combine_chunks())
         self._held, self._rows = [], 0
 
     def keep(self) -> None:
         """Write what is held, and put the log in its place."""
-        self._flush()
+        self.flush()
         self._writer.close()
         self._file.flush()
         os.fsync(self._file.fileno())
