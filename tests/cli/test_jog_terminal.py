@@ -1,6 +1,7 @@
 """``cdhr jog`` in a real terminal: keys, typed G-code, Ctrl-C, and a terminal that goes away."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -15,13 +16,20 @@ sys.path.insert(0, str(Path(__file__).parent))
 from pseudo import Pseudo
 from terminal import ROOT, TMUX, Terminal, until
 
+from cdhr_host.profile import find
+
 tmux = pytest.mark.skipif(TMUX is None, reason="tmux is not installed")
 
 
 @contextmanager
-def far_side(folder: Path) -> Iterator[str]:
-    """``cdhr sim`` in a process of its own; the URL of its drives."""
-    port = folder / "machine"
+def far_side(folder: Path) -> Iterator[list[str]]:
+    """``cdhr sim`` in a process of its own, and how it is jogged.
+
+    The machine is a patient one: what is looked at here is the screen, not how punctual the computer is.
+    """
+    port, profile = folder / "machine", folder / "patient.toml"
+    text = find("paper").read_text(encoding="utf-8")
+    profile.write_text(re.sub(r"(?m)^setpoint_watchdog_ms = .*$", "setpoint_watchdog_ms = 400.0", text))
     with (folder / "sim.txt").open("w") as out:
         sim = subprocess.Popen(
             [
@@ -29,6 +37,8 @@ def far_side(folder: Path) -> Iterator[str]:
                 "-m",
                 "cdhr_host",
                 "sim",
+                "--profile",
+                str(profile),
                 "--link",
                 str(port),
                 "--trace",
@@ -40,7 +50,7 @@ def far_side(folder: Path) -> Iterator[str]:
         )
         try:
             until(port.exists, (folder / "sim.txt").read_text)
-            yield f"slcan:{port}@1000000"
+            yield ["jog", "--profile", str(profile), "--drives", f"slcan:{port}@1000000"]
         finally:
             sim.send_signal(signal.SIGINT)
             sim.wait(30)
@@ -80,7 +90,7 @@ def test_over_loopback(tmp_path: Path) -> None:
 
 @tmux
 def test_over_a_serial_adapter(tmp_path: Path) -> None:
-    with far_side(tmp_path) as url, Terminal(tmp_path, ["jog", "--drives", url]) as terminal:
+    with far_side(tmp_path) as jog, Terminal(tmp_path, jog) as terminal:
         driven(terminal)
         terminal.keys("c", *["Right"] * 10)
         terminal.shows("hold a key")
@@ -109,7 +119,7 @@ def test_ctrl_c_holds_and_stays(tmp_path: Path) -> None:
 
 @tmux
 def test_a_terminal_that_is_gone_brings_the_machine_to_rest(tmp_path: Path) -> None:
-    with far_side(tmp_path) as url, Terminal(tmp_path, ["jog", "--drives", url]) as terminal:
+    with far_side(tmp_path) as jog, Terminal(tmp_path, jog) as terminal:
         terminal.shows("IDLE", "referenced")
         terminal.type(":G1 X120 F600\r")
         until(lambda: "nozzle X    0.000" not in terminal.screen, lambda: terminal.screen)

@@ -21,7 +21,8 @@ from cdhr_host.units import KPA, MM
 FEEDBACK_LOST: Final = 3
 """answers in a row that may be missing less one"""
 SOFT_SILENCE: Final = 0.1
-"""s without answers that pass where soft real time is allowed: serial lines deliver late too"""
+"""s without answers that pass where soft real time is allowed, or as long as the drives wait for setpoints
+where that is longer: serial lines deliver late too"""
 UNFOLLOWING: Final = 2
 WATCHDOG: Final = 0x8250
 """EMCY code of a drive whose receive PDO came too late"""
@@ -37,7 +38,8 @@ class Watch:
         self._bus = bus
         self._axes = axes
         self._heartbeat = settings.heartbeat
-        soft = round(SOFT_SILENCE / profile.drives.period) if settings.allow_soft_realtime else 0
+        silence = max(SOFT_SILENCE, settings.setpoint_watchdog) if settings.allow_soft_realtime else 0.0
+        soft = round(silence / profile.drives.period)
         self._strict = not settings.allow_soft_realtime
         watchdog = 0 if self._strict else round(settings.setpoint_watchdog / profile.drives.period)
         self._unfollowing = max(UNFOLLOWING, watchdog)
