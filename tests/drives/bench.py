@@ -195,7 +195,8 @@ class Bench:
         self.far = Station(self.profile) if far is None else far(self.profile)
         self.wire = wire(self.far)
         self.clock.work = lambda now: self.wire.work(now)  # noqa: PLW0108 - tests replace it
-        store = ReferenceStore(Path(tempfile.mkdtemp()) / "references.json") if store is None else store
+        folder = tempfile.mkdtemp(dir=os.environ["XDG_STATE_HOME"])  # which the tests take away at their end
+        store = ReferenceStore(Path(folder) / "references.json") if store is None else store
         self.link = CyclicLink(self.profile, self.clock, self.wire.connect, store)
         self.user = LinkClock(self.clock, self.link)
         self.far.start(self.clock.now())
