@@ -13,7 +13,7 @@ os.environ["XDG_STATE_HOME"] = STATE
 atexit.register(shutil.rmtree, STATE, ignore_errors=True)
 HERE = Path(__file__).parent
 TRACED = {"program", "mechanism", "motion", "extrusion", "control", "plant", "samples", "pipeline", "laws"}
-"""the pure rooms' own tests, of which a share of covered lines is asked; tracing would slow the others down"""
+"""the pure rooms' own tests, of which a share of covered lines is asked; tracing would slow others down"""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
