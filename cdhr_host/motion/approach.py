@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdhr_host.motion.beside import norms
+from cdhr_host.motion.vectors import norms, units
 from cdhr_host.values import Array, Flags, Ints
 
 SHARP = 0.25
@@ -126,8 +126,8 @@ def _paired(drawn: _Drawn, feed: Array, h: float, spent: Array) -> Array:
     middle = (points[pair] + points[pair + 1]) / 2
     speck = SPECK * length[pair, None]
     paired = points.copy()
-    paired[pair] = middle - np.where(before, speck * _units(middle - points[pair - 1]), 0.0)
-    paired[pair + 1] = middle + np.where(before, 0.0, speck * _units(points[pair + 2] - middle))
+    paired[pair] = middle - np.where(before, speck * units(middle - points[pair - 1]), 0.0)
+    paired[pair + 1] = middle + np.where(before, 0.0, speck * units(points[pair + 2] - middle))
     spent[pair] = spent[pair + 1] = (0.5 + SPECK) * length[pair]
     return paired
 
@@ -172,7 +172,7 @@ def _off(drawn: _Drawn, first: Ints, last: Ints) -> tuple[Ints, Array, Ints]:
     row = np.repeat(np.arange(len(first)), count)
     point = first[row] + 1 + np.arange(len(row)) - heads[row]
     start = drawn.points[first]
-    unit = _units(drawn.points[last] - start)
+    unit = units(drawn.points[last] - start)
     onwards = np.einsum("nk,nk->n", drawn.points[point] - start[row], unit[row])
     return point, start[row] + onwards[:, None] * unit[row], heads
 
@@ -184,8 +184,8 @@ def _fits(drawn: _Drawn, first: Ints, last: Ints, h: float) -> Flags:
     point, target, heads = _off(drawn, first, last)
     off = norms(target - drawn.points[point])
     row = np.repeat(np.arange(len(first)), last - first)
-    ahead = _units(drawn.points[point] - drawn.points[point - 1])
-    unit = _units(drawn.points[last] - drawn.points[first])[row]
+    ahead = units(drawn.points[point] - drawn.points[point - 1])
+    unit = units(drawn.points[last] - drawn.points[first])[row]
     along = np.minimum.reduceat(np.einsum("nk,nk->n", ahead, unit), heads) >= ONWARDS
     return np.asarray(along & (np.maximum.reduceat(off, heads) <= SPENT * h), dtype=np.bool_)
 
@@ -203,9 +203,3 @@ def _moved(drawn: _Drawn, first: Ints, last: Ints, spent: Array) -> Array:
     for side in (first, last):
         np.maximum.at(spent, side, np.maximum.reduceat(off, heads))
     return moved
-
-
-def _units(vectors: Array) -> Array:
-    """(N, 3) -> (N, 3); 0 stays 0."""
-    length = np.maximum(norms(vectors), np.finfo(float).tiny)
-    return np.asarray(vectors / length[:, None], dtype=np.float64)

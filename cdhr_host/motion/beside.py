@@ -115,8 +115,3 @@ def way(speed: Array, acceleration: float, jerk: float) -> Array:
     """(K,) m/s -> (K,) m from there to rest."""
     hard, soft = speed / acceleration + acceleration / jerk, 2 * np.sqrt(speed / jerk)
     return np.asarray(speed * np.where(speed * jerk > acceleration**2, hard, soft) / 2, dtype=np.float64)
-
-
-def norms(vectors: Array) -> Array:
-    """(N, 3) -> (N,): lengths of vectors."""
-    return np.asarray(np.sqrt(np.einsum("nk,nk->n", vectors, vectors)), dtype=np.float64)

@@ -14,7 +14,7 @@ import numpy as np
 
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.motion.approach import reach, straightened
-from cdhr_host.motion.beside import Allowance, norms, way
+from cdhr_host.motion.beside import Allowance, way
 from cdhr_host.motion.budget import Bends
 from cdhr_host.motion.cells import TOUCHING, Cells, cells
 from cdhr_host.motion.flow import FlowLimits
@@ -22,6 +22,7 @@ from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.look_ahead import border_speeds, stoppable
 from cdhr_host.motion.smooth_path import SmoothPath, smooth
 from cdhr_host.motion.time_law import TimeLaw, time_law
+from cdhr_host.motion.vectors import norms
 from cdhr_host.units import MM
 from cdhr_host.values import Array, Ints
 

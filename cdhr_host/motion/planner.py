@@ -9,11 +9,11 @@ from functools import singledispatchmethod
 import numpy as np
 
 from cdhr_host.motion.arc import chords
-from cdhr_host.motion.beside import norms
 from cdhr_host.motion.curves import points_on
 from cdhr_host.motion.leg import AS_PROGRAMMED, BATCH, FeedOverride, LegPlanner, Segments
 from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.sampling import Stand, Stretch, Timeline
+from cdhr_host.motion.vectors import norms
 from cdhr_host.values import (
     Arc,
     Array,

@@ -16,10 +16,10 @@ from typing import Final
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from cdhr_host.motion.beside import norms
 from cdhr_host.motion.flow import UNBOUNDED, FlowLimits
 from cdhr_host.motion.hold import RATE_CURVATURE, RATE_SLOPE
 from cdhr_host.motion.playback import Pace, played
+from cdhr_host.motion.vectors import norms
 from cdhr_host.profile.schema import Profile
 from cdhr_host.values import Array, Setpoints, ToolTrack
 

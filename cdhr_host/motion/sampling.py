@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdhr_host.motion.beside import norms
 from cdhr_host.motion.leg import Leg
 from cdhr_host.motion.shaping import UNSHAPED, Shaper
+from cdhr_host.motion.vectors import norms
 from cdhr_host.values import Array, Ints, ToolTrack
 
 BLOCK = 4096

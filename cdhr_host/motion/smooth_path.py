@@ -27,8 +27,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdhr_host.motion.approach import Moved
-from cdhr_host.motion.beside import Allowance, Beside, beside, norms
+from cdhr_host.motion.beside import Allowance, Beside, beside
 from cdhr_host.motion.corner import Rounding, Widths, roundings
+from cdhr_host.motion.vectors import norms
 from cdhr_host.values import Array, Flags, Ints
 
 STRAIGHT = 1e-9

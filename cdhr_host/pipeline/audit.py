@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdhr_host.errors import Problem
-from cdhr_host.motion.beside import norms
+from cdhr_host.motion.vectors import norms
 from cdhr_host.profile import Profile
 from cdhr_host.units import KPA, MM
 from cdhr_host.values import Array, CableState, Flags, Ints, Setpoints, ToolTrack

@@ -7,8 +7,8 @@ import numpy as np
 
 from cdhr_host.errors import Problem
 from cdhr_host.motion.arc import chords
-from cdhr_host.motion.beside import norms
 from cdhr_host.motion.curves import points_on
+from cdhr_host.motion.vectors import norms
 from cdhr_host.pipeline.audit import on_bed
 from cdhr_host.pipeline.clearing import Clearing
 from cdhr_host.pipeline.staircase import Staircase

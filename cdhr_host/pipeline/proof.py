@@ -10,9 +10,9 @@ import numpy as np
 from cdhr_host.errors import MAX_LISTED, Problem
 from cdhr_host.extrusion import AirStage
 from cdhr_host.motion.arc import arc_length
-from cdhr_host.motion.beside import norms
 from cdhr_host.motion.curves import spline_length
 from cdhr_host.motion.sampling import Timed
+from cdhr_host.motion.vectors import norms
 from cdhr_host.pipeline.clearing import Clearing
 from cdhr_host.pipeline.columns import setpoint_columns
 from cdhr_host.pipeline.leading import Leading

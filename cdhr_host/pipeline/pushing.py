@@ -15,9 +15,9 @@ import numpy as np
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.extrusion import AirModel
 from cdhr_host.motion.arc import arc_length
-from cdhr_host.motion.beside import norms
 from cdhr_host.motion.curves import spline_length
 from cdhr_host.motion.flow import FlowLimits
+from cdhr_host.motion.vectors import norms
 from cdhr_host.units import KPA, MM, MM3
 from cdhr_host.values import Arc, Array, Command, Ints, Moves, Notice, Prime, Spline
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from cdhr_host.errors import Problem
-from cdhr_host.motion.beside import norms
+from cdhr_host.motion.vectors import norms
 from cdhr_host.pipeline import Checked
 from cdhr_host.units import KPA, MM
 from cdhr_host.values import Array

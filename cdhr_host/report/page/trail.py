@@ -6,7 +6,7 @@ import numpy as np
 
 from cdhr_host.errors import Problem
 from cdhr_host.mechanism import Windows
-from cdhr_host.motion.beside import norms
+from cdhr_host.motion.vectors import norms
 from cdhr_host.pipeline import Checked
 from cdhr_host.profile import Profile
 from cdhr_host.report.page.places import place_of
