@@ -27,7 +27,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdhr_host.motion.beside import Allowance, Beside
-from cdhr_host.values import Array, Ints
+from cdhr_host.motion.chords import Turns, widened
+from cdhr_host.values import Array, Flags, Ints
 
 SHARES = np.linspace(-1.0, 1.0, 9)
 """p/r that are compared on each side; the first is the kernel's."""
@@ -38,6 +39,8 @@ HALVINGS = 12
 """Of an interval of speeds, to compare times."""
 TIED = 1e-9
 """Of a time, less is no gain: which of two equal ways is taken must not depend on rounding."""
+RADIANS, METRES = 9, 12
+"""Decimals of what the choice is made by, for the same reason."""
 ALONE = 0.999
 """Of the usual half-width, the least room on both sides of a corner that stands alone."""
 
@@ -76,6 +79,11 @@ class Corners:
         room, feed, limits = self.room[:, which], self.feed[:, which], self.limits[:, which]
         return Corners(self.turn[which], room, feed, limits, self.width[which])
 
+    def rounded(self) -> "Corners":
+        """Without the last digits, in which sums along the path differ with where they begin."""
+        turn, room, width = self.turn.round(RADIANS), self.room.round(METRES), self.width.round(METRES)
+        return Corners(turn, room, self.feed, self.limits, width)
+
 
 @dataclass(frozen=True, slots=True)
 class Widths:
@@ -86,26 +94,39 @@ class Widths:
     own: Array
     """(K,) m, the same for a corner that stands alone; less where the way to it was drawn straight"""
     ends: Array
-    """(K,) m to the path's nearest end; half of it is left for the stop"""
+    """(2, K) m to both ends of the path; half of it is left for the stop"""
+    moved: Array
+    """(N,) m of the polyline where points were moved, ascending"""
+
+
+def turns(around: Beside, turn: Array, widths: Widths) -> Turns:
+    """K corners, whose changes of direction are (K,), with the kernels they have each for itself."""
+    reach = around.room.min(axis=0)
+    alone = reach >= ALONE * widths.usual
+    shared = np.minimum(widths.usual, widths.ends.min(axis=0) / 2)
+    half = np.where(alone, np.minimum(reach, 2 * widths.own / turn), shared)
+    return Turns(around.at, turn, half, alone, around.room, widths.ends, widths.moved)
 
 
 def roundings(
-    around: Beside, corner: Ints, turn: Array, widths: Widths, allowed: Allowance | None
+    single: Turns, even: Array, corner: Ints, widths: Widths, allowed: Allowance | None
 ) -> Rounding:
-    """Roundings of the corners at points ``corner`` (K,) of a polyline, with changes of direction (K,)."""
-    reach = around.room.min(axis=0)
-    alone = reach >= ALONE * widths.usual
-    half = np.where(
-        alone, np.minimum(reach, 2 * widths.own / turn), np.minimum(widths.usual, widths.ends / 2)
-    )
-    none, steep = np.zeros((2, len(half))), 1 / half**2
-    found = Rounding(half, none, none.copy(), np.array([[-steep, steep], [steep, -steep]]))
-    if allowed is not None:
-        share = _beside(allowed.share, corner, 0.0).min(axis=0)
-        limits = np.multiply.outer(np.array([allowed.acceleration, allowed.jerk]), share)
-        corners = Corners(turn, around.even, _beside(allowed.feed, corner, 0.0), limits, widths.own)
-        _brake(found, _worthwhile(half, corners, widths.usual, allowed), corners)
+    """Roundings of the corners at points ``corner`` (K,) of a polyline; ``even`` as in ``Beside``."""
+    if allowed is None:
+        return _kernels(single.half)
+    feed = _beside(allowed.feed, corner, 0.0)
+    half, chords = widened(single, feed.max(axis=0), widths.usual, allowed)
+    share = _beside(allowed.share, corner, 0.0).min(axis=0)
+    limits = np.multiply.outer(np.array([allowed.acceleration, allowed.jerk]), share)
+    corners, found = Corners(single.turn, even, feed, limits, widths.own), _kernels(half)
+    _brake(found, _worthwhile(half, corners, ~chords, widths.usual, allowed), corners)
     return found
+
+
+def _kernels(half: Array) -> Rounding:
+    """Kernels of half-widths (K,) m, without braking."""
+    none, steep = np.zeros((2, len(half))), 1 / half**2
+    return Rounding(half, none, none.copy(), np.array([[-steep, steep], [steep, -steep]]))
 
 
 def _beside(values: Array, corner: Ints, end: float) -> Array:
@@ -114,16 +135,17 @@ def _beside(values: Array, corner: Ints, end: float) -> Array:
     return np.stack((padded[corner], padded[corner + 1]))
 
 
-def _worthwhile(half: Array, around: Corners, h: float, allowed: Allowance) -> Ints:
+def _worthwhile(half: Array, around: Corners, single: Flags, h: float, allowed: Allowance) -> Ints:
     """Corners with room on both sides at which a kernel would hold up a change of speed.
 
-    Not where the air bounds that change: a flow that falls and rises within a corner is the hardest for it.
+    Only ``single`` (K,) ones, not chords that are smoothed together. Not where the air bounds that change:
+    a flow that falls and rises within a corner is the hardest for it.
     """
     by_jerk = np.cbrt(allowed.jerk * half**2 / around.turn)
     by_acceleration = np.sqrt(allowed.acceleration * half / around.turn)
     slow = np.minimum(by_jerk, by_acceleration) < around.feed.max(axis=0)
     roomy = around.room.min(axis=0) >= ALONE * h
-    return np.flatnonzero(slow & roomy & (around.limits[0] >= allowed.acceleration))
+    return np.flatnonzero(slow & roomy & single & (around.limits[0] >= allowed.acceleration))
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,7 +251,7 @@ def _brake(found: Rounding, which: Ints, around: Corners) -> None:
     """Replace those kernels that braking is quicker than."""
     if not len(which):
         return
-    swing = _soonest(around.only(which))
+    swing = _soonest(around.only(which).rounded())
     braked = (swing.share > -1.0).any(axis=0)
     which, share, r = which[braked], swing.share[:, braked], swing.r[:, braked]
     speed, duration = swing.speed[braked], swing.duration[braked]

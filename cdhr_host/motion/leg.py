@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdhr_host.errors import MotionError, Problem
-from cdhr_host.motion.approach import reach, straightened
+from cdhr_host.motion import approach, chords
 from cdhr_host.motion.beside import Allowance, way
 from cdhr_host.motion.budget import Bends
 from cdhr_host.motion.cells import TOUCHING, Cells, cells
@@ -231,7 +231,7 @@ class LegPlanner:
     def _path(self, segments: Segments, *, closes: bool) -> tuple[SmoothPath, Segments]:
         """The smoothed path of what is not forgotten, and the segments as it follows them."""
         h, dropped = self._limits.half_width, self._begin.dropped
-        points, moved = straightened(segments.points, segments.feed, h)
+        points, moved = approach.straightened(segments.points, segments.feed, h)
         allowed = self._allowed(segments)
         path = smooth(points, h, passed=dropped, closes=closes, allowed=allowed, moved=moved)
         return path, replace(segments, points=points)
@@ -267,11 +267,12 @@ class LegPlanner:
         """m of path drawn before a place on which the path there depends, at speeds up to this.
 
         A corner whose rounding goes on there lies at most one room before, what lies beside it depends on
-        two rooms more, and a turn on where points were moved.
+        two rooms more, a turn on where points were moved, and how wide a kernel is on the turns around it.
         """
         limits = self._limits
         room = max(float(way(np.array(speed), limits.acceleration, limits.jerk)), 2 * limits.half_width)
-        return 3 * room + 2 * reach(limits.half_width)
+        before = 2 * approach.reach(limits.half_width) + chords.reach(limits.half_width)
+        return 3 * room + before
 
     def _too_fast(self, speed: float) -> MotionError:
         assert self._segments is not None

@@ -28,7 +28,8 @@ import numpy as np
 
 from cdhr_host.motion.approach import Moved
 from cdhr_host.motion.beside import Allowance, Beside, beside
-from cdhr_host.motion.corner import Rounding, Widths, roundings
+from cdhr_host.motion.chords import firm
+from cdhr_host.motion.corner import Rounding, Widths, roundings, turns
 from cdhr_host.motion.vectors import norms
 from cdhr_host.values import Array, Flags, Ints
 
@@ -123,43 +124,55 @@ def smooth(
     lengths = norms(steps)
     drawn = np.concatenate(([0.0], np.cumsum(lengths)))
     direction = steps / lengths[:, None]
-    corner, turns = _corners(direction)
-    ends = np.minimum(passed + drawn[corner], drawn[-1] - drawn[corner] if closes else math.inf)
-    turn = norms(turns[1] - turns[0])
+    corner, directions = _corners(direction)
+    last = drawn[-1] if closes else math.inf
+    ends = np.stack((passed + drawn[corner], last - drawn[corner]))
+    turn = norms(directions[1] - directions[0])
     around = beside(drawn, corner, turn, least=h, allowed=allowed)
-    own = h - 3.0 * (np.zeros(len(points)) if moved is None else moved.spent)[corner]
-    rounding = roundings(around, corner, turn, Widths(h, own, ends), allowed)
+    spent = np.zeros(len(points)) if moved is None else moved.spent
+    widths = Widths(h, h - 3.0 * spent[corner], ends, drawn[spent > 0.0])
+    single = turns(around, turn, widths)
+    rounding = roundings(single, around.even, corner, widths, allowed)
     saved = np.zeros((2, len(points)))
     saved[:, corner] = rounding.saved
     after = drawn + np.cumsum(saved.sum(axis=0))
     middle = after - saved[1]
     last = after[-1]
-    knots, kinks = _knots(middle[corner], turns, rounding, np.append(middle[:-1], -h), last)
-    widths = np.diff(knots, append=last)[:, None]
+    knots, kinks = _knots(middle[corner], directions, rounding, np.append(middle[:-1], -h), last)
+    lasting = np.diff(knots, append=last)[:, None]
     segment = np.clip(np.searchsorted(middle, knots, side="right") - 1, 0, len(lengths) - 1)
     third, straight = kinks.third, kinks.bending == 0
-    second = _before(third * widths) + kinks.second
+    second = _before(third * lasting) + kinks.second
     second = _anchored(second, np.zeros_like(second), straight)
     initial = direction[0]
-    slope = initial + _before(second * widths + third * widths**2 / 2)
+    slope = initial + _before(second * lasting + third * lasting**2 / 2)
     slope = _anchored(slope, direction[segment], straight)
-    increments = slope * widths + second * widths**2 / 2 + third * widths**3 / 6
+    increments = slope * lasting + second * lasting**2 / 2 + third * lasting**3 / 6
     value = points[0] - h * initial + _before(increments)
     onwards = points[segment] + (knots - after[segment])[:, None] * direction[segment]
     value = _anchored(value, onwards, straight)
     coefficients = np.stack([np.ascontiguousarray(rows.T) for rows in (value, slope, second, third)])
-    known = _known(around, corner, moved, drawn, after)
+    known = -math.inf if moved is None else _known(around, corner, moved.firm - 1, drawn)
+    if allowed is not None and moved is not None:
+        known = firm(single, h, known, float(drawn[moved.firm - 1]))
+    known = _along(known, drawn, after)
     return SmoothPath(knots, float(last), coefficients, segment, kinks.bending, kinks.brake, after, known)
 
 
-def _known(around: Beside, corner: Ints, moved: Moved | None, drawn: Array, after: Array) -> float:
-    """m in s up to which no further drawing changes the path."""
-    edge = 0 if moved is None else moved.firm - 1
+def _known(around: Beside, corner: Ints, edge: int, drawn: Array) -> float:
+    """m of the polyline up to which no further drawing changes what single corners need.
+
+    Up to point ``edge`` the turns stay.
+    """
     if edge < 1:
         return -math.inf
-    known = around.firm(int(np.searchsorted(corner, edge)), float(drawn[edge]), around.ways[edge - 1])
-    point = int(np.searchsorted(drawn, known, side="right")) - 1
-    return float(after[point] + known - drawn[point]) if point >= 0 else -math.inf
+    return around.firm(int(np.searchsorted(corner, edge)), float(drawn[edge]), around.ways[edge - 1])
+
+
+def _along(place: float, drawn: Array, after: Array) -> float:
+    """m of the polyline -> m in s."""
+    point = int(np.searchsorted(drawn, place, side="right")) - 1
+    return float(after[point] + place - drawn[point]) if point >= 0 else -math.inf
 
 
 def _dot(a: Array, b: Array) -> Array:
