@@ -23,10 +23,10 @@ from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.smooth_path import SmoothPath
 from cdhr_host.values import Array, Flags, Ints
 
-SHARES = (0.95, 0.8, 0.6, 0.4, 0.25, 0.1)
-"""Shares x of the limits that a bend may spend on changing speed, tried in this order."""
+SHARES = (0.95, 0.8, 0.6, 0.4, 0.25, 0.1, 0.03)
+"""Shares x of the limits that a bend may spend on changing speed."""
 NEARLY = 0.97
-"""A share is good enough when it keeps this part of the speed wanted,"""
+"""A share is the usual one when it is the first that keeps this part of the speed wanted,"""
 TURNING = 0.88
 """or this part of the speed that a long bend allows, where that is less: there it will change."""
 NEWTON_STEPS = 6
@@ -104,25 +104,55 @@ class Bends:
         return np.asarray(value / slope, dtype=np.float64)
 
 
-def shares(  # noqa: PLR0917 -- a column each
-    cap: Array, room: Array, bends: Bends, long: Flags, braked: Flags, limits: MotionLimits
-) -> tuple[Array, Array]:
-    """(K,) m/s: speed, and share of the limits that may be spent on changing it, of each stretch.
+@dataclass(frozen=True, slots=True)
+class Menu:
+    """M ways to run through each of K stretches: the faster, the less is left for changing speed."""
 
-    ``room`` (K,) of the acceleration is what the cables leave of it. ``long`` stretches must let the
-    speed change. Corners that are braked into (``braked``) have their change of speed in their path.
+    speed: Array
+    """(M, K) m/s, greatest s'"""
+    share: Array
+    """(M, K) of the limits that changing speed may take"""
+
+    def least(self, heads: Ints) -> "Menu":
+        """Of rows of stretches, each from one of ``heads`` to before the next."""
+        return Menu(*(np.minimum.reduceat(each, heads, axis=1) for each in (self.speed, self.share)))
+
+    def within(self, spend: Array) -> "Menu":
+        """No more than (K,) of the limits for changing speed."""
+        return Menu(self.speed, np.minimum(self.share, spend))
+
+    def usual(self, long: Flags, cap: Array) -> tuple[Array, Array]:
+        """(K,) m/s and (K,): the one of them by which stretches are compared; ``cap`` is the speed wanted."""
+        steady = self.speed[-1]
+        enough = np.where(long & (steady < cap), TURNING, NEARLY) * steady
+        row, column = np.argmax(self.speed >= enough, axis=0), np.arange(len(cap))
+        return self.speed[row, column], self.share[row, column]
+
+    def settled(self, which: Ints, speed: Array, share: Array) -> "Menu":
+        """With only the one way given (K,), in some of the stretches."""
+        speeds, shares = self.speed.copy(), self.share.copy()
+        speeds[:, which], shares[:, which] = speed[which], share[which]
+        return Menu(speeds, shares)
+
+
+def menu(  # noqa: PLR0917 -- a column each
+    cap: Array, room: Array, bends: Bends, long: Flags, braked: Flags, limits: MotionLimits
+) -> Menu:
+    """Speeds, and shares of the limits that may be spent on changing them, of each of K stretches.
+
+    ``cap`` (K,) m/s is wanted; ``room`` (K,) of the acceleration is what the cables leave of it. ``long``
+    stretches must let the speed change. Corners that are braked into (``braked``) have their change of
+    speed in their path.
     """
     straight = bends.second == 0
     steady = np.minimum(cap, bends.speed(0.0, limits, room))
-    speed, share = steady, np.where(straight, 1.0, 0.0)
-    enough = np.where(long & (steady < cap), TURNING, NEARLY) * steady
-    undecided = np.flatnonzero(~straight & ~braked)
-    for candidate in SHARES:
-        some = bends.only(undecided).speed(candidate, limits, room[undecided])
-        reached = np.minimum(cap[undecided], some)
-        good = reached >= enough[undecided]
-        if candidate == SHARES[-1]:
-            good |= long[undecided]
-        speed[undecided[good]], share[undecided[good]] = reached[good], candidate
-        undecided = undecided[~good]
-    return speed, share * room
+    speed = np.tile(steady, (len(SHARES), 1))
+    share = np.tile(np.where(straight, 1.0, 0.0), (len(SHARES), 1))
+    slower = np.flatnonzero(~straight & ~braked)
+    for row, candidate in enumerate(SHARES):
+        reached = np.minimum(cap[slower], bends.only(slower).speed(candidate, limits, room[slower]))
+        speed[row:, slower], share[row:, slower] = reached, candidate
+        slower = slower[reached < cap[slower]]
+    short = slower[~long[slower]]
+    speed[-1, short], share[-1, short] = steady[short], 0.0
+    return Menu(speed, share * room)

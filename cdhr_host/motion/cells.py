@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdhr_host.motion.budget import Bends, shares
+from cdhr_host.motion.budget import Bends, menu
 from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.smooth_path import SmoothPath
 from cdhr_host.values import Array, Flags, Ints
@@ -37,18 +37,22 @@ TOUCHING = 1e-12
 
 @dataclass(frozen=True, slots=True)
 class Cells:
-    """K stretches of path in order, each with bounds on ds/dt and its derivatives."""
+    """K stretches of path in order, each with bounds on ds/dt and its derivatives.
+
+    A bend can be run through in several ways, the faster, the less the speed may change; ways are
+    in this order. A straight has one, M times.
+    """
 
     start: Array
     """(K,) m in s"""
     length: Array
     """(K,) m in s"""
     speed: Array
-    """(K,) m/s, greatest s'"""
+    """(M, K) m/s, greatest s' on each of M ways to run through a cell"""
     acceleration: Array
-    """(K,) m/s², greatest |s''|; 0 where the speed must stay constant"""
+    """(M, K) m/s², greatest |s''|; 0 where the speed must stay constant"""
     jerk: Array
-    """(K,) m/s³, greatest |s'''|; 0 where the speed must stay constant"""
+    """(M, K) m/s³, greatest |s'''|; 0 where the speed must stay constant"""
     settled: float
     """m in s: cells up to it keep their bounds whatever path follows"""
     bent: Flags
@@ -61,9 +65,9 @@ class Cells:
         return Cells(
             self.start[which],
             self.length[which],
-            self.speed[which],
-            self.acceleration[which],
-            self.jerk[which],
+            self.speed[:, which],
+            self.acceleration[:, which],
+            self.jerk[:, which],
             self.settled,
             self.bent[which],
             self.pulls[:, which],
@@ -121,20 +125,20 @@ def cells(
     pieces = _between(path, bends, (np.minimum(feed, limits.speed), *share), span, h=h, at_ends=long)
     rows = _rows(pieces, h, passed)
     cap = np.minimum(rows.cap, _pushed_speed(rows, limits))
-    speed, spent = shares(cap, rows.room, rows.bends, rows.long, rows.braked, limits)
-    spent = np.minimum(spent, rows.spend)
+    ways = menu(cap, rows.room, rows.bends, rows.long, rows.braked, limits).within(rows.spend)
+    speed, spent = ways.usual(rows.long, cap)
+    held_up = rows.long & (speed < cap)
     heads, settled = _alike(rows, speed, spent, h, (passed, _begun(path, span[0])))
     open_end = bool(rows.bent[-1])
-    rows, speed, spent = (
-        _merged(rows, heads),
-        np.minimum.reduceat(speed, heads),
-        np.minimum.reduceat(spent, heads),
-    )
+    rows, ways = _merged(rows, heads), ways.least(heads)
+    speed, spent = (np.minimum.reduceat(each, heads) for each in (speed, spent))
     spent, last = _levelled(rows, speed, spent, passed, settled if open_end else np.inf)
-    heads = _heads(speed, spent, *rows.brake, _multiples(rows.start + passed, _longest(speed)))
-    rows, speed, spent = _merged(rows, heads), speed[heads], spent[heads]
-    a, j = spent * limits.acceleration, spent * limits.jerk
-    return Cells(rows.start, rows.length, speed, a, j, min(span[1], last), rows.long, _pulls(rows.brake))
+    apart = np.where(np.maximum.reduceat(held_up, heads), np.arange(len(heads)), -1)
+    heads = _heads(speed, spent, *rows.brake, _multiples(rows.start + passed, _longest(speed)), apart)
+    rows, ways, pulls = _merged(rows, heads), ways.least(heads), _pulls(rows.brake[:, heads])
+    ways = ways.settled(np.flatnonzero(pulls.any(axis=0)), speed[heads], spent[heads])
+    a, j = ways.share * limits.acceleration, ways.share * limits.jerk
+    return Cells(rows.start, rows.length, ways.speed, a, j, min(span[1], last), rows.long, pulls)
 
 
 def _pushed_speed(rows: _Stretches, limits: MotionLimits) -> Array:

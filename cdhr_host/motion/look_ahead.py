@@ -7,6 +7,9 @@ At most borders s'' = 0. Beside a corner that is braked into, a straight begins 
 s'' = b v² or ends with -b v² (``Cells.pulls``). It is then part of a longer change, from
 the speed v - (b v²)²/2j at which s'' would have been 0 with full jerk, and must rise to at
 least v + (b v²)²/2j before it can fall.
+
+A bend can be run through in several ways, the faster, the less the speed may change in it. From border to
+border it must be one of them; which, is chosen when the speeds at all borders are known (``choice``).
 """
 
 import math
@@ -26,6 +29,8 @@ HALVINGS = 48
 """Of an interval of speeds: to rounding."""
 SPARE = 1 - 1e-6
 """Of the length of a cell with pulls: near an end's peak it varies with the root of rounding."""
+ROUNDING = 1e-13
+"""m by which a change of speed may be longer than its cell."""
 CLOSE = 1e-13
 """m, how well a search meets the length of a cell, from below."""
 
@@ -88,18 +93,21 @@ def end(speed: Array, pull: Array, jerk: Array) -> End:
 
 def ends(cells: Cells, borders: Array) -> tuple[End, End]:
     """Both ends of each cell, of border speeds (K+1,) m/s."""
-    return end(borders[:-1], cells.pulls[0], cells.jerk), end(borders[1:], cells.pulls[1], cells.jerk)
+    jerk = cells.jerk[0]  # where there are pulls there is one way
+    return end(borders[:-1], cells.pulls[0], jerk), end(borders[1:], cells.pulls[1], jerk)
 
 
 def needed(both: tuple[End, End], peak: Array, cells: Cells) -> Array:
-    """(K,) m: the way from the first end up to a peak (K,) m/s and down to the other end."""
+    """(M, K) m: the distance from the first end up to a peak (K,) or (M, K) m/s and down to the other end."""
     a, j = cells.acceleration, cells.jerk
-    return sum((change_distance(one.least, peak, a, j) - one.spared for one in both), np.zeros(len(peak)))
+    return sum((change_distance(one.least, peak, a, j) - one.spared for one in both), np.zeros(a.shape))
 
 
-def _shortest(both: tuple[End, End], cells: Cells) -> Array:
-    """(K,) m: the least length in which a cell can have these ends."""
-    return needed(both, np.maximum(both[0].peak, both[1].peak), cells)
+def feasible(both: tuple[End, End], cells: Cells) -> Flags:
+    """(M, K) whether each cell can have these ends."""
+    peak = np.maximum(both[0].peak, both[1].peak)
+    within = needed(both, peak, cells) <= cells.length + ROUNDING
+    return np.asarray(within & (peak <= cells.speed), dtype=np.bool_)
 
 
 def _below_peak(peak: Array, pull: Array, jerk: Array) -> Array:
@@ -145,22 +153,23 @@ def _reversed(cells: Cells) -> Cells:
     return replace(
         cells,
         length=cells.length[::-1],
-        acceleration=cells.acceleration[::-1],
-        jerk=cells.jerk[::-1],
+        speed=cells.speed[:, ::-1],
+        acceleration=cells.acceleration[:, ::-1],
+        jerk=cells.jerk[:, ::-1],
         pulls=cells.pulls[::-1, ::-1],
     )
 
 
 def _caps(cells: Cells) -> Array:
     """(K+1,) m/s: what the cells on both sides of a border allow, by themselves."""
-    sides = [_below_peak(cells.speed, pull, cells.jerk) for pull in cells.pulls]
+    sides = [_below_peak(cells.speed[-1], pull, cells.jerk[0]) for pull in cells.pulls]
     sides = [np.minimum(side, _pulling(pull, cells)) for side, pull in zip(sides, cells.pulls, strict=True)]
     cap: Array = np.minimum(np.append(sides[0], np.inf), np.concatenate(([np.inf], sides[1])))
     pulled = np.flatnonzero(cells.pulls.any(axis=0))
     if len(pulled):
         some = cells.only(pulled)
-        both = end(cap[pulled], some.pulls[0], some.jerk), end(cap[pulled + 1], some.pulls[1], some.jerk)
-        short = _shortest(both, some) > some.length
+        first, last = (end(cap[pulled + i], some.pulls[i], some.jerk[0]) for i in (0, 1))
+        short = needed((first, last), np.maximum(first.peak, last.peak), some)[0] > some.length
         narrow = pulled[short]
         for border, speed in zip((narrow, narrow + 1), _narrowed(cells.only(narrow)), strict=True):
             np.minimum.at(cap, border, speed)
@@ -170,39 +179,73 @@ def _caps(cells: Cells) -> Array:
 def _pulling(pull: Array, cells: Cells) -> Array:
     """(K,) m/s: the speed at which s'' at an end is the cell's greatest."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        return np.asarray(np.where(pull > 0.0, np.sqrt(cells.acceleration / pull), np.inf), dtype=np.float64)
+        speed = np.sqrt(cells.acceleration[0] / pull)
+    return np.asarray(np.where(pull > 0.0, speed, np.inf), dtype=np.float64)
 
 
 def _narrowed(cells: Cells) -> tuple[Array, Array]:
     """Greatest speeds of both ends of cells, leading to the same peak, that their lengths allow."""
-    low, high = np.zeros(len(cells.length)), cells.speed.copy()
+    jerk = cells.jerk[0]
+    low, high = np.zeros(len(cells.length)), cells.speed[0]
     for _ in range(HALVINGS if len(low) else 0):
         middle = (low + high) / 2
-        both = [end(_below_peak(middle, pull, cells.jerk), pull, cells.jerk) for pull in cells.pulls]
-        fits = needed((both[0], both[1]), middle, cells) <= SPARE * cells.length
+        both = [end(_below_peak(middle, pull, jerk), pull, jerk) for pull in cells.pulls]
+        fits = needed((both[0], both[1]), middle, cells)[0] <= SPARE * cells.length
         low, high = np.where(fits, middle, low), np.where(fits, high, middle)
-    return _below_peak(low, cells.pulls[0], cells.jerk), _below_peak(low, cells.pulls[1], cells.jerk)
+    return _below_peak(low, cells.pulls[0], jerk), _below_peak(low, cells.pulls[1], jerk)
 
 
 def _pass(cap: Array, cells: Cells) -> Array:
     """(K+1,) -> (K+1,): each speed lowered to what the one before it can reach."""
     first, last = ends(cells, cap)
-    short = (_shortest((first, last), cells) > cells.length) & (last.peak > first.peak)
-    speeds = cap.tolist()
-    length, a, j = cells.length.tolist(), cells.acceleration.tolist(), cells.jerk.tolist()
-    pulls = cells.pulls.T.tolist()
-    for i in np.flatnonzero(short).tolist():
+    short = np.flatnonzero(last.peak > first.peak)
+    some = cells.only(short)
+    short = short[~feasible((first.only(short), last.only(short)), some).any(axis=0)]
+    speeds, ways = cap.tolist(), _Ways.of(cells)
+    for i in short.tolist():
         k = i
-        while k < len(length):
-            if any(pulls[k]):
-                reached = _pulled(speeds[k], speeds[k + 1], length[k], (a[k], j[k]), pulls[k])
-            else:
-                reached = reachable(speeds[k], length[k], a[k], j[k])
+        while k < len(ways.length):
+            reached = ways.reached(k, speeds[k], speeds[k + 1])
             if reached >= speeds[k + 1]:
                 break
             speeds[k + 1] = reached
             k += 1
     return np.array(speeds)
+
+
+@dataclass(frozen=True, slots=True)
+class _Ways:
+    """The ways to run through each of K cells, as lists."""
+
+    length: list[float]
+    """m"""
+    pulls: list[list[float]]
+    """1/m"""
+    several: list[bool]
+    """whether there are more ways than one"""
+    ways: list[list[list[float]]]
+    """of m/s, m/s² and m/s³"""
+
+    @classmethod
+    def of(cls, cells: Cells) -> "_Ways":
+        ways = np.stack((cells.speed, cells.acceleration, cells.jerk), axis=-1).swapaxes(0, 1)
+        several = (ways[:, 0] != ways[:, -1]).any(axis=1)
+        return cls(cells.length.tolist(), cells.pulls.T.tolist(), several.tolist(), ways.tolist())
+
+    def reached(self, k: int, v0: float, v1: float) -> float:
+        """m/s: greatest speed up to v1 that cell k reaches from v0."""
+        length, ways = self.length[k], self.ways[k]
+        if any(self.pulls[k]):
+            return _pulled(v0, v1, length, ways[0], self.pulls[k])
+        if not self.several[k]:
+            return min(ways[0][0], reachable(v0, length, *ways[0][1:]))
+        best = v0
+        for v, a, j in ways:
+            if best < v and v0 <= v:
+                best = max(best, min(v, reachable(v0, length, a, j)))
+                if best >= v1:
+                    break
+        return best
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,9 +290,10 @@ def _end(speed: float, pull: float, jerk: float) -> tuple[float, float, float]:
     return speed - gain, (speed - gain + gain / 3) * time, speed + gain
 
 
-def _pulled(v0: float, v1: float, length: float, limits: tuple[float, float], pulls: list[float]) -> float:
-    """m/s: greatest speed up to v1 that a cell with pulls reaches from v0."""
-    way = _Way(_end(v0, pulls[0], limits[1]), SPARE * length, *limits, pulls[1])
+def _pulled(v0: float, v1: float, length: float, limits: list[float], pulls: list[float]) -> float:
+    """m/s: greatest speed up to v1 that a cell with pulls and ``limits`` as in ``_Ways`` reaches from v0."""
+    _, a, j = limits
+    way = _Way(_end(v0, pulls[0], j), SPARE * length, a, j, pulls[1])
     low, high = way.below_peak(), v1
     if low >= high or (over := way.lacking(high)) <= 0.0:
         return v1
@@ -269,20 +313,3 @@ def _pulled(v0: float, v1: float, length: float, limits: tuple[float, float], pu
         if high - low <= 1e-15:
             break
     return low
-
-
-def peak_speeds(cells: Cells, both: tuple[End, End]) -> Array:
-    """(K,) m/s: greatest speed inside each cell between its ends."""
-    least = np.maximum(both[0].peak, both[1].peak)
-    peaks = np.maximum(cells.speed, least)
-    length = np.where(cells.pulls.any(axis=0), SPARE, 1.0) * cells.length
-    short = np.flatnonzero(needed(both, peaks, cells) > length)
-    if len(short):
-        some, ends_there = cells.only(short), (both[0].only(short), both[1].only(short))
-        low, high = least[short], peaks[short]
-        for _ in range(HALVINGS):
-            middle = (low + high) / 2
-            fits = needed(ends_there, middle, some) <= length[short]
-            low, high = np.where(fits, middle, low), np.where(fits, high, middle)
-        peaks[short] = low
-    return peaks

@@ -6,7 +6,8 @@ import numpy as np
 
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.motion.cells import Cells
-from cdhr_host.motion.look_ahead import ends, peak_speeds
+from cdhr_host.motion.choice import chosen
+from cdhr_host.motion.look_ahead import ends
 from cdhr_host.motion.speed_change import speed_change
 from cdhr_host.units import MM
 from cdhr_host.values import Array
@@ -51,8 +52,8 @@ def time_law(cells: Cells, borders: Array) -> TimeLaw:
 
     In each cell the speed rises to a peak, cruises, and falls to the next border.
     """
+    cells, peaks = chosen(cells, borders)
     both = ends(cells, borders)
-    peaks = peak_speeds(cells, both)
     duration = np.zeros((len(peaks), 7))
     jerk = np.zeros((len(peaks), 7))
     a0, a1 = both[0].change, both[1].change
@@ -86,7 +87,7 @@ def _change(
     """Fill in the three pieces (K, 3) of each cell whose speed changes, with s'' at both ends of that."""
     (v0, v1), (a0, a1) = speed, change
     for k in np.flatnonzero(v0 != v1).tolist():
-        a, j = float(cells.acceleration[k]), float(cells.jerk[k])
+        a, j = float(cells.acceleration[0, k]), float(cells.jerk[0, k])
         t, jerks = speed_change(float(v0[k]), float(v1[k]), a, j, (float(a0[k]), float(a1[k])))
         duration[k], jerk[k] = t[:3], jerks[:3]
 

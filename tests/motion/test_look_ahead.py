@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from cdhr_host.errors import MotionError
 from cdhr_host.motion.cells import Cells
+from cdhr_host.motion.choice import chosen
 from cdhr_host.motion.look_ahead import (
     _below_peak,
     border_speeds,
@@ -16,7 +17,6 @@ from cdhr_host.motion.look_ahead import (
     end,
     ends,
     needed,
-    peak_speeds,
     reachable,
 )
 from cdhr_host.motion.speed_change import speed_change
@@ -30,10 +30,13 @@ def distance(v0, v1, a, j):
 
 
 def cells(length, speed, a, j, pulls=None):
+    """Cells with one way each, or M where the limits are given as (M, K)."""
     length = np.asarray(length, float)
     start = np.concatenate(([0.0], np.cumsum(length)[:-1]))
     bent = np.zeros(len(length), bool)
-    columns = (np.broadcast_to(np.asarray(x, float), len(length)) for x in (speed, a, j))
+    limits = [np.atleast_1d(np.asarray(x, float)) for x in (speed, a, j)]
+    ways = max(x.shape[0] if x.ndim == 2 else 1 for x in limits)
+    columns = (np.broadcast_to(x, (ways, len(length))) for x in limits)
     pulls = np.zeros((2, len(length))) if pulls is None else np.asarray(pulls, float)
     return Cells(start, length, *columns, float(length.sum()), bent, pulls)
 
@@ -74,15 +77,55 @@ def test_border_speeds_can_be_driven(rows):
     found = cells(length, speed, a, 10 * a)
     speeds, forward = border_speeds(found, 0.0, 0.0)
     assert (speeds <= forward).all()
-    needed = change_distance(speeds[:-1], speeds[1:], found.acceleration, found.jerk)
-    assert (needed <= found.length * (1 + 1e-9)).all()
     assert (speeds[:-1] <= speed).all()
     assert (speeds[1:] <= speed).all()
-    peaks = peak_speeds(found, ends(found, speeds))
+    one, peaks = chosen(found, speeds)
     assert (peaks <= speed * (1 + 1e-12)).all()
-    there = change_distance(speeds[:-1], peaks, found.acceleration, found.jerk)
-    back = change_distance(peaks, speeds[1:], found.acceleration, found.jerk)
-    assert (there + back <= found.length * (1 + 1e-9)).all()
+    assert (driven(one, speeds, peaks) <= found.length * (1 + 1e-9)).all()
+
+
+def driven(one, speeds, peaks):
+    """(K,) m: way up to the peaks and down again in cells with one way each."""
+    a, j = one.acceleration[0], one.jerk[0]
+    return change_distance(speeds[:-1], peaks, a, j) + change_distance(peaks, speeds[1:], a, j)
+
+
+WAYS = np.array([0.9, 0.5, 0.2, 0.03])
+"""Shares of the limits, and the faster the less is left for changing speed."""
+
+
+@given(st.lists(st.tuples(st.floats(1e-4, 0.05), SPEED), min_size=1, max_size=20))
+def test_of_several_ways_one_is_driven(rows):
+    length, speed = (np.array(column) for column in zip(*rows, strict=True))
+    speeds = np.multiply.outer(np.sqrt(1 - WAYS**2), speed)
+    a = np.multiply.outer(WAYS, np.full(len(speed), 0.5))
+    found = cells(length, speeds, a, 10 * a)
+    borders, forward = border_speeds(found, 0.0, 0.0)
+    assert (borders <= forward).all()
+    one, peaks = chosen(found, borders)
+    assert (driven(one, borders, peaks) <= found.length * (1 + 1e-9) + 1e-12).all()
+    assert (peaks <= one.speed[0] * (1 + 1e-12)).all()
+    assert (np.maximum(borders[:-1], borders[1:]) <= one.speed[0]).all()
+
+
+def test_a_long_bend_is_entered_slowly_and_run_through_fast():
+    # A quarter of the limits goes to changing speed first, next to nothing of them in the middle.
+    speeds = np.multiply.outer(np.sqrt(1 - WAYS**2), np.full(7, 0.07))
+    a = np.multiply.outer(WAYS, np.full(7, 0.5))
+    found = cells(np.full(7, 0.012), speeds, a, 10 * a)
+    borders, _ = border_speeds(found, 0.0, 0.0)
+    one, peaks = chosen(found, borders)
+    assert one.acceleration[0, 0] > one.acceleration[0, 1] > one.acceleration[0, 3] == 0.03 * 0.5
+    assert peaks[3] == speeds[-1, 3]
+    durations = [time_law(only, border_speeds(only, 0.0, 0.0)[0]).duration for only in each_way(found)]
+    assert time_law(found, borders).duration < min(durations)
+
+
+def each_way(found):
+    """The same cells with only one of their ways."""
+    for way in range(len(found.speed)):
+        limits = found.speed[way], found.acceleration[way], found.jerk[way]
+        yield cells(found.length, *limits)
 
 
 @given(
@@ -106,9 +149,9 @@ def test_straights_between_braked_corners_can_be_driven(rows):
     assert (speeds <= forward * (1 + 1e-12)).all()
     assert np.array_equal(speeds[1:-1:2], speeds[2::2])
     assert (speeds[1:-1] > 0.0).all()
-    peaks = peak_speeds(found, both)
-    assert (needed(both, peaks, found) <= found.length * (1 + 1e-9) + 1e-12).all()
-    assert (peaks <= found.speed * (1 + 1e-9)).all()
+    _, peaks = chosen(found, speeds)
+    assert (needed(both, peaks, found)[0] <= found.length * (1 + 1e-9) + 1e-12).all()
+    assert (peaks <= found.speed[0] * (1 + 1e-9)).all()
     assert (np.maximum(both[0].peak, both[1].peak) <= peaks * (1 + 1e-9)).all()
     law = time_law(found, speeds)
     after = np.diff(law.t, append=law.duration)
@@ -144,7 +187,7 @@ def test_a_nozzle_all_but_at_rest_in_a_corner_needs_way_to_come_out_of_it():
     found = cells([1.4e-3, 1e-3, 4e-3, 5e-3], 0.03, 0.5, 5.0, pulls)
     speeds, _ = border_speeds(found, 1.06e-3, 0.0)
     both = ends(found, speeds)
-    assert (needed(both, peak_speeds(found, both), found) <= found.length * (1 + 1e-9)).all()
+    assert (needed(both, chosen(found, speeds)[1], found)[0] <= found.length * (1 + 1e-9)).all()
 
 
 def test_a_change_of_speed_for_which_there_is_no_way_is_refused():
