@@ -60,6 +60,12 @@ class Cells:
     pulls: Array
     """(2, K) 1/m: at its start s'' is pulls[0] s'², at its end -pulls[1] s'²"""
 
+    @property
+    def several(self) -> Flags:
+        """(K,) whether there is more than one way to run through it."""
+        speed, a = self.speed, self.acceleration
+        return np.asarray((speed[0] != speed[-1]) | (a[0] != a[-1]), dtype=np.bool_)
+
     def only(self, which: Ints | slice) -> "Cells":
         """Some of the cells."""
         return Cells(

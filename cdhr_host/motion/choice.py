@@ -18,9 +18,7 @@ def chosen(cells: Cells, borders: Array) -> tuple[Cells, Array]:
     Their ends are passed at ``borders`` (K+1,) m/s.
     """
     both = ends(cells, borders)
-    several = np.flatnonzero(
-        (cells.speed[0] != cells.speed[-1]) | (cells.acceleration[0] != cells.acceleration[-1])
-    )
+    several = np.flatnonzero(cells.several)
     row, column = np.zeros(len(cells.length), dtype=np.intp), np.arange(len(cells.length))
     row[several] = _soonest(cells.only(several), (both[0].only(several), both[1].only(several)))
     speed, a, j = (each[row, column][None] for each in (cells.speed, cells.acceleration, cells.jerk))

@@ -201,6 +201,8 @@ def _pass(cap: Array, cells: Cells) -> Array:
     short = np.flatnonzero(last.peak > first.peak)
     some = cells.only(short)
     short = short[~feasible((first.only(short), last.only(short)), some).any(axis=0)]
+    if not len(short):
+        return cap
     speeds, ways = cap.tolist(), _Ways.of(cells)
     for i in short.tolist():
         k = i
@@ -215,33 +217,37 @@ def _pass(cap: Array, cells: Cells) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class _Ways:
-    """The ways to run through each of K cells, as lists."""
+    """The ways to run through each of K cells, for one cell after the other."""
 
     length: list[float]
     """m"""
     pulls: list[list[float]]
     """1/m"""
+    first: list[list[float]]
+    """m/s, m/s² and m/s³ of the first way"""
     several: list[bool]
-    """whether there are more ways than one"""
-    ways: list[list[list[float]]]
-    """of m/s, m/s² and m/s³"""
+    """whether there are more"""
+    all: Array
+    """(M, K, 3)"""
 
     @classmethod
     def of(cls, cells: Cells) -> "_Ways":
-        ways = np.stack((cells.speed, cells.acceleration, cells.jerk), axis=-1).swapaxes(0, 1)
-        several = (ways[:, 0] != ways[:, -1]).any(axis=1)
-        return cls(cells.length.tolist(), cells.pulls.T.tolist(), several.tolist(), ways.tolist())
+        ways = np.stack((cells.speed, cells.acceleration, cells.jerk), axis=-1)
+        return cls(
+            cells.length.tolist(), cells.pulls.T.tolist(), ways[0].tolist(), cells.several.tolist(), ways
+        )
 
     def reached(self, k: int, v0: float, v1: float) -> float:
         """m/s: greatest speed up to v1 that cell k reaches from v0."""
-        length, ways = self.length[k], self.ways[k]
+        length = self.length[k]
         if any(self.pulls[k]):
-            return _pulled(v0, v1, length, ways[0], self.pulls[k])
+            return _pulled(v0, v1, length, self.first[k], self.pulls[k])
         if not self.several[k]:
-            return min(ways[0][0], reachable(v0, length, *ways[0][1:]))
+            v, a, j = self.first[k]
+            return min(v, reachable(v0, length, a, j))
         best = v0
-        for v, a, j in ways:
-            if best < v and v0 <= v:
+        for v, a, j in self.all[:, k].tolist():
+            if best < v:
                 best = max(best, min(v, reachable(v0, length, a, j)))
                 if best >= v1:
                     break
