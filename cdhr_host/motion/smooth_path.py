@@ -59,6 +59,12 @@ class SmoothPath:
     known: float
     """m, s up to which no further drawing changes the path"""
 
+    def only(self, which: Ints) -> "SmoothPath":
+        """With some of the pieces; between them lies nothing that digits can tell."""
+        start, bending, brake = self.start[which], self.bending[which], self.brake[:, which]
+        pieces = self.coefficients[:, :, which], self.segment[which], bending, brake
+        return SmoothPath(start, self.end, *pieces, self.drawn, self.known)
+
     def lengths(self) -> Array:
         """(K,) m: length in s of each piece."""
         return np.diff(self.start, append=self.end)
@@ -117,7 +123,8 @@ def smooth(
     It is part of a path that began ``passed`` m before the first point and ends, if it
     ``closes``, at the last; there the result is the drawn path. Otherwise it is exact only from
     the farthest reach of a kernel after the first point to as much before the last. Pieces begin
-    at s = -h. With an allowance, corners that would cost much speed are braked into.
+    where the first kernel does, at s = -h or before. With an allowance, corners that would cost much
+    speed are braked into.
     ``moved`` is what was done to the points already (``motion.approach``).
     """
     steps = np.diff(points, axis=0)
@@ -138,8 +145,9 @@ def smooth(
     after = drawn + np.cumsum(saved.sum(axis=0))
     middle = after - saved[1]
     last = after[-1]
-    knots, kinks = _knots(middle[corner], directions, rounding, np.append(middle[:-1], -h), last)
-    lasting = np.diff(knots, append=last)[:, None]
+    begin = float(np.min(middle[corner] - rounding.half, initial=-h))
+    knots, lasting, kinks = _knots(middle[corner], directions, rounding, np.append(middle[:-1], begin), last)
+    lasting = lasting[:, None]
     segment = np.clip(np.searchsorted(middle, knots, side="right") - 1, 0, len(lengths) - 1)
     third, straight = kinks.third, kinks.bending == 0
     second = _before(third * lasting) + kinks.second
@@ -148,15 +156,17 @@ def smooth(
     slope = initial + _before(second * lasting + third * lasting**2 / 2)
     slope = _anchored(slope, direction[segment], straight)
     increments = slope * lasting + second * lasting**2 / 2 + third * lasting**3 / 6
-    value = points[0] - h * initial + _before(increments)
+    value = points[0] + begin * initial + _before(increments)
     onwards = points[segment] + (knots - after[segment])[:, None] * direction[segment]
     value = _anchored(value, onwards, straight)
     coefficients = np.stack([np.ascontiguousarray(rows.T) for rows in (value, slope, second, third)])
+    here = np.flatnonzero(np.diff(knots, append=last) > 0)
     known = -math.inf if moved is None else _known(around, corner, moved.firm - 1, drawn)
     if allowed is not None and moved is not None:
         known = firm(single, h, known, float(drawn[moved.firm - 1]))
     known = _along(known, drawn, after)
-    return SmoothPath(knots, float(last), coefficients, segment, kinks.bending, kinks.brake, after, known)
+    path = SmoothPath(knots, float(last), coefficients, segment, kinks.bending, kinks.brake, after, known)
+    return path if len(here) == len(knots) else path.only(here)
 
 
 def _known(around: Beside, corner: Ints, edge: int, drawn: Array) -> float:
@@ -221,13 +231,14 @@ class _Kinks:
 
 def _knots(
     middle: Array, turns: tuple[Array, Array], rounding: Rounding, also: Array, last: float
-) -> tuple[Array, _Kinks]:
-    """Piece starts (K,), and what is on each.
+) -> tuple[Array, Array, _Kinks]:
+    """Piece starts and lengths (K,), and what is on each.
 
     Pieces begin where a rounding does, at its middle and end, and ``also`` elsewhere.
     """
     (before, after), half, brake = turns, rounding.half, rounding.brake
-    at = np.concatenate((middle - half, middle, middle + half, also))
+    exact = middle.astype(np.longdouble)
+    at = np.concatenate((exact - half, exact, exact + half, also))
     first, second = (old[:, None] * before + new[:, None] * after for old, new in rounding.third)
     none = np.zeros((len(also), 3))
     order = np.argsort(at, kind="stable")
@@ -235,7 +246,7 @@ def _knots(
     keep = np.diff(at, append=last) > 0
     one = np.ones(len(half))
     active = np.cumsum(np.concatenate((one, 0 * one, -one, none[:, 0]))[order])
-    third = np.cumsum(np.concatenate((first, second - first, -second, none))[order], axis=0)
+    third = _summed(np.concatenate((first, second - first, -second, none))[order])
     third[active == 0] = 0.0
     entering, leaving = brake[:, :, None]
     jump, braked = np.zeros_like(third), np.zeros((2, len(at)))
@@ -245,9 +256,16 @@ def _knots(
         braking = np.concatenate((brake, 0 * brake, -brake, np.zeros((2, len(also)))), axis=1)
         braked = np.where(active > 0, np.cumsum(braking[:, order], axis=1), 0.0)
     bending = active.astype(np.int64)
-    return at[keep], _Kinks(third[keep], jump[keep], bending[keep], braked[:, keep])
+    lengths = np.diff(at[keep], append=last).astype(np.float64)
+    kinks = _Kinks(third[keep], jump[keep], bending[keep], braked[:, keep])
+    return at[keep].astype(np.float64), lengths, kinks
 
 
 def _before(increments: Array) -> Array:
     """Running sum of all earlier rows."""
-    return np.concatenate((np.zeros((1, increments.shape[1])), np.cumsum(increments, axis=0)[:-1]))
+    return np.concatenate((np.zeros((1, increments.shape[1])), _summed(increments)[:-1]))
+
+
+def _summed(rows: Array) -> Array:
+    """Running sum with more digits: in a bend of metres nothing is straight, and rounding adds up."""
+    return np.cumsum(rows, axis=0, dtype=np.longdouble).astype(np.float64)

@@ -4,11 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from motion_tracks import distance_to
+from motion_tracks import distance_to, moves
 
 from cdhr_host.motion import approach
 from cdhr_host.motion.beside import Allowance
 from cdhr_host.motion.chords import WIDEST
+from cdhr_host.motion.limits import MotionLimits
+from cdhr_host.motion.planner import Planner
 from cdhr_host.motion.smooth_path import smooth
 
 H = 0.747e-3
@@ -89,3 +91,27 @@ def test_no_wider_kernel_reaches_into_a_sharp_corners_room():
     piece, _, slope, _ = path.at(places)
     assert not path.bending[piece].any()
     assert np.ptp(slope, axis=0).max() < 1e-9
+
+
+def test_a_bend_of_many_metres_is_continuous_within_and_between_its_stretches():
+    angle = np.cumsum(np.full(14_000, 0.012))
+    points = np.column_stack((0.025 * np.cos(angle), 0.025 * np.sin(angle), 1e-5 * angle))
+    limits = MotionLimits(0.1, 0.5, 5.0, H, math.radians(179))
+    planner = Planner(limits, points[0])
+    parts = [points[k : k + 4701] for k in range(0, len(points) - 1, 4700)]
+    legs = [leg for part in parts for leg in planner.stretches(moves(part, FAST))]
+    legs += planner.close()
+    assert len(legs) > 2
+    before = None
+    for leg in legs:
+        first, last = (leg.law.at(np.array([t]))[0][0] for t in (0.0, leg.duration))
+        inner = (leg.path.start > first) & (leg.path.start <= last)
+        x, (c0, c1, c2, c3) = leg.path.lengths()[:-1], leg.path.coefficients[:, :, :-1]
+        ends = c0 + x * (c1 + x * (c2 / 2 + x * c3 / 6)), c1 + x * (c2 + x * c3 / 2)
+        for end, begin in zip(ends, leg.path.coefficients[:2, :, 1:], strict=True):
+            assert np.abs(end - begin)[:, inner[1:]].max() < 1e-12
+        places = np.array([first, last])
+        here = np.stack(leg.path.at(places)[1:])
+        if before is not None:
+            assert np.abs(here[:, 0] - before).max(axis=1) == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+        before = here[:, 1]
