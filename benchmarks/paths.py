@@ -142,7 +142,7 @@ def _between(path: SmoothPath, span: tuple[float, float]) -> tuple[Array, Array]
     return np.maximum(path.start[piece], span[0]), piece
 
 
-def _drawn(points_mm: Array, feeds_mm_s: Array | float) -> bytes:
+def drawn_program(points_mm: Array, feeds_mm_s: Array | float) -> bytes:
     """A program through points (N, 2), from (0, 0)."""
     feeds = np.broadcast_to(np.asarray(feeds_mm_s, dtype=float), (len(points_mm),))
     lines = [f"G1 X{x:.5f} Y{y:.5f} F{60 * f:.3f}" for (x, y), f in zip(points_mm, feeds, strict=True)]
@@ -200,25 +200,25 @@ def _noisy_line(length_mm: float, chord_mm: float, noise_mm: float) -> Array:
 
 
 SMALL: dict[str, Callable[[], bytes]] = {
-    "straight 60 mm, F50": lambda: _drawn(np.array([[60.0, 0.0]]), 50.0),
-    "straight 4 mm, F50": lambda: _drawn(np.array([[4.0, 0.0]]), 50.0),
-    "straight, F 10-50-20-80": lambda: _drawn(
+    "straight 60 mm, F50": lambda: drawn_program(np.array([[60.0, 0.0]]), 50.0),
+    "straight 4 mm, F50": lambda: drawn_program(np.array([[4.0, 0.0]]), 50.0),
+    "straight, F 10-50-20-80": lambda: drawn_program(
         np.column_stack((np.arange(10.0, 90.0, 10.0), np.zeros(8))),
         np.array([10.0, 50.0, 20.0, 80.0, 10.0, 50.0, 20.0, 80.0]),
     ),
-    "square 20 mm, F20": lambda: _drawn(_polygon(4, 20.0), 20.0),
-    "square 20 mm, F60": lambda: _drawn(_polygon(4, 20.0), 60.0),
-    "octagon 10 mm, F60": lambda: _drawn(_polygon(8, 10.0), 60.0),
-    "zigzag 20°, F60": lambda: _drawn(_zigzag(20.0, 10.0, 6), 60.0),
-    "zigzag 60°, F60": lambda: _drawn(_zigzag(60.0, 10.0, 6), 60.0),
-    "zigzag 120°, F60": lambda: _drawn(_zigzag(120.0, 10.0, 6), 60.0),
-    "zigzag 140°, 2 mm, F60": lambda: _drawn(_zigzag(140.0, 2.0, 10), 60.0),
-    "circle R10, chords 0.3 mm, F20": lambda: _drawn(_circle(10.0, 0.3), 20.0),
-    "circle R10, chords 0.3 mm, F90": lambda: _drawn(_circle(10.0, 0.3), 90.0),
-    "circle R10, chords 2 mm, F60": lambda: _drawn(_circle(10.0, 2.0), 60.0),
-    "spiral, chords 0.5 mm, F60": lambda: _drawn(_spiral(3.0, 5.0, 0.5), 60.0),
-    "Hilbert 3 mm, F40": lambda: _drawn(_hilbert(2, 3.0), 40.0),
-    "line, 0.5 mm chords, 0.05 mm noise, F40": lambda: _drawn(_noisy_line(20.0, 0.5, 0.05), 40.0),
+    "square 20 mm, F20": lambda: drawn_program(_polygon(4, 20.0), 20.0),
+    "square 20 mm, F60": lambda: drawn_program(_polygon(4, 20.0), 60.0),
+    "octagon 10 mm, F60": lambda: drawn_program(_polygon(8, 10.0), 60.0),
+    "zigzag 20°, F60": lambda: drawn_program(_zigzag(20.0, 10.0, 6), 60.0),
+    "zigzag 60°, F60": lambda: drawn_program(_zigzag(60.0, 10.0, 6), 60.0),
+    "zigzag 120°, F60": lambda: drawn_program(_zigzag(120.0, 10.0, 6), 60.0),
+    "zigzag 140°, 2 mm, F60": lambda: drawn_program(_zigzag(140.0, 2.0, 10), 60.0),
+    "circle R10, chords 0.3 mm, F20": lambda: drawn_program(_circle(10.0, 0.3), 20.0),
+    "circle R10, chords 0.3 mm, F90": lambda: drawn_program(_circle(10.0, 0.3), 90.0),
+    "circle R10, chords 2 mm, F60": lambda: drawn_program(_circle(10.0, 2.0), 60.0),
+    "spiral, chords 0.5 mm, F60": lambda: drawn_program(_spiral(3.0, 5.0, 0.5), 60.0),
+    "Hilbert 3 mm, F40": lambda: drawn_program(_hilbert(2, 3.0), 40.0),
+    "line, 0.5 mm chords, 0.05 mm noise, F40": lambda: drawn_program(_noisy_line(20.0, 0.5, 0.05), 40.0),
 }
 """Small programs by name; each starts at program (0, 0, 0)."""
 
