@@ -11,8 +11,8 @@ leave an eighth or less. So q leaves p by no more than
 
 Kernels are widened as long as that is no more than the third of the usual half-width that all are
 allowed. While widths differ by no more than the corners are apart, q' stays an average of
-unit vectors (``smooth_path``), and no wider kernel reaches where a corner stands alone, nor where points
-were moved (``approach``).
+unit vectors (``smooth_path``), and no wider kernel reaches where a corner stands alone, nor over points that
+were moved (``approach``) or at which the feed changes.
 """
 
 import math
@@ -35,6 +35,8 @@ PARTS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.42, 0.35, 0.3)
 """and parts of it that are tried."""
 FARTHER = 1.25
 """What all turns that reach a place leave there, for one that leaves most of them: 1 + 2/8."""
+ALMOST = 0.99
+"""Of the usual half-width: no kernel away from the path's ends is narrower."""
 TOUCHING = 1e-9
 """m and parts: equal but for rounding, which must not decide how wide a kernel is."""
 
@@ -55,8 +57,8 @@ class Turns:
     """(2, K) m of the straights before and after it"""
     ends: Array
     """(2, K) m to both ends of the path"""
-    moved: Array
-    """(N,) m of the polyline where moved points lie, ascending"""
+    borders: Array
+    """(N,) m of the polyline over which no wider kernel reaches, ascending"""
 
     @property
     def fences(self) -> Array:
@@ -69,8 +71,7 @@ def widened(turns: Turns, feed: Array, h: float, allowed: Allowance) -> tuple[Ar
 
     ``feed`` (K,) m/s is wanted at each, ``h`` m the usual half-width.
     """
-    by_jerk = np.sqrt(turns.turn * feed**3 / allowed.jerk)
-    need = np.maximum(by_jerk, turns.turn * feed**2 / allowed.acceleration)
+    need = _needed(turns.turn, feed, allowed)
     wish = np.where(HELD_UP * need > turns.half, WISH * need, 0.0)
     wish = np.minimum(np.minimum(wish, WIDEST * h), _clear(turns))
     which = np.flatnonzero((turns.turn < SHARP) & (wish > turns.half * (1 + TOUCHING)))
@@ -84,26 +85,39 @@ def widened(turns: Turns, feed: Array, h: float, allowed: Allowance) -> tuple[Ar
     return np.where(chords, np.maximum(_even(turns, half, chords), turns.half), turns.half), chords
 
 
-def firm(turns: Turns, h: float, known: float, edge: float) -> float:
+def firm(turns: Turns, known: float, edge: float, widest: float) -> float:
     """m of the polyline up to which no further drawing changes the path.
 
     Up to ``known`` m it does not for what single corners need, and up to ``edge`` m the turns stay. A kernel
-    reaches one width, is evened with those a width further, and limited by the turns three widths beyond.
+    reaches one width, ``widest`` (m) at most, is evened with those a width further, and limited by the turns
+    three widths beyond.
     """
-    fences, widest = turns.fences, WIDEST * h
+    fences = turns.fences
     last = int(np.searchsorted(fences, known, "right"))
     divided = float(fences[last - 1]) if last else -math.inf
     return max(divided, min(known - 2 * widest, edge - 5 * widest))
 
 
 def reach(h: float) -> float:
-    """m of path drawn before a place on which it depends."""
+    """m of path drawn before a place on which it depends, and after it."""
     return 5 * WIDEST * h
 
 
+def widest(feed: float, h: float, allowed: Allowance) -> float:
+    """m/s, m -> m: the widest kernel where no feed is higher; 0 if all keep to ``h``."""
+    need = float(_needed(np.array(SHARP), np.array(feed), allowed))
+    return min(WISH * need, WIDEST * h) if HELD_UP * need > ALMOST * h else 0.0
+
+
+def _needed(turn: Array, feed: Array, allowed: Allowance) -> Array:
+    """m: the half-width at which a corner by itself takes the whole of acceleration or jerk."""
+    by_jerk = np.sqrt(turn * feed**3 / allowed.jerk)
+    return np.asarray(np.maximum(by_jerk, turn * feed**2 / allowed.acceleration), dtype=np.float64)
+
+
 def _clear(turns: Turns) -> Array:
-    """(K,) m to where points were moved and to fences, or half of that to the path's end if it is nearer."""
-    fence = np.concatenate(([-np.inf], np.sort(np.concatenate((turns.moved, turns.fences))), [np.inf]))
+    """(K,) m to borders and fences, or half of that to the path's end if it is nearer."""
+    fence = np.concatenate(([-np.inf], np.sort(np.concatenate((turns.borders, turns.fences))), [np.inf]))
     before = turns.at - fence[np.searchsorted(fence, turns.at + TOUCHING) - 1]
     after = fence[np.searchsorted(fence, turns.at - TOUCHING)] - turns.at
     clear = np.stack((before, after))

@@ -95,8 +95,8 @@ class Widths:
     """(K,) m, the same for a corner that stands alone; less where the way to it was drawn straight"""
     ends: Array
     """(2, K) m to both ends of the path; half of it is left for the stop"""
-    moved: Array
-    """(N,) m of the polyline where points were moved, ascending"""
+    borders: Array
+    """(N,) m of the polyline where points were moved or the feed changes, ascending"""
 
 
 def turns(around: Beside, turn: Array, widths: Widths) -> Turns:
@@ -105,7 +105,7 @@ def turns(around: Beside, turn: Array, widths: Widths) -> Turns:
     alone = reach >= ALONE * widths.usual
     shared = np.minimum(widths.usual, widths.ends.min(axis=0) / 2)
     half = np.where(alone, np.minimum(reach, 2 * widths.own / turn), shared)
-    return Turns(around.at, turn, half, alone, around.room, widths.ends, widths.moved)
+    return Turns(around.at, turn, half, alone, around.room, widths.ends, widths.borders)
 
 
 def roundings(

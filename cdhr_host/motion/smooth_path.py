@@ -26,9 +26,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdhr_host.motion import chords
 from cdhr_host.motion.approach import Moved
 from cdhr_host.motion.beside import Allowance, Beside, beside
-from cdhr_host.motion.chords import firm
+from cdhr_host.motion.chords import Turns
 from cdhr_host.motion.corner import Rounding, Widths, roundings, turns
 from cdhr_host.motion.vectors import norms
 from cdhr_host.values import Array, Flags, Ints
@@ -137,7 +138,7 @@ def smooth(
     turn = norms(directions[1] - directions[0])
     around = beside(drawn, corner, turn, least=h, allowed=allowed)
     spent = np.zeros(len(points)) if moved is None else moved.spent
-    widths = Widths(h, h - 3.0 * spent[corner], ends, drawn[spent > 0.0])
+    widths = Widths(h, h - 3.0 * spent[corner], ends, drawn[(spent > 0.0) | _changes(allowed, len(points))])
     single = turns(around, turn, widths)
     rounding = roundings(single, around.even, corner, widths, allowed)
     saved = np.zeros((2, len(points)))
@@ -163,7 +164,7 @@ def smooth(
     here = np.flatnonzero(np.diff(knots, append=last) > 0)
     known = -math.inf if moved is None else _known(around, corner, moved.firm - 1, drawn)
     if allowed is not None and moved is not None:
-        known = firm(single, h, known, float(drawn[moved.firm - 1]))
+        known = _firm(single, known, float(drawn[moved.firm - 1]), drawn, h=h, allowed=allowed)
     known = _along(known, drawn, after)
     path = SmoothPath(knots, float(last), coefficients, segment, kinks.bending, kinks.brake, after, known)
     return path if len(here) == len(knots) else path.only(here)
@@ -177,6 +178,24 @@ def _known(around: Beside, corner: Ints, edge: int, drawn: Array) -> float:
     if edge < 1:
         return -math.inf
     return around.firm(int(np.searchsorted(corner, edge)), float(drawn[edge]), around.ways[edge - 1])
+
+
+def _firm(single: Turns, known: float, edge: float, drawn: Array, *, h: float, allowed: Allowance) -> float:
+    """m of the polyline up to which no further drawing changes the path.
+
+    Up to ``known`` m it does not for what single corners need, and up to ``edge`` m the turns stay.
+    """
+    near = (drawn[1:] > edge - chords.reach(h)) & (drawn[:-1] < edge)
+    widest = chords.widest(float(allowed.feed[near].max(initial=0.0)), h, allowed)
+    return chords.firm(single, known, edge, widest) if widest else known
+
+
+def _changes(allowed: Allowance | None, count: int) -> Flags:
+    """(M+1,) points at which the feed changes."""
+    found = np.zeros(count, dtype=np.bool_)
+    if allowed is not None:
+        found[1:-1] = np.diff(allowed.feed) != 0.0
+    return found
 
 
 def _along(place: float, drawn: Array, after: Array) -> float:
