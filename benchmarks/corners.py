@@ -17,6 +17,7 @@ from itertools import pairwise
 import casadi
 import numpy as np
 from paths import drawn_program, machine, planned_runs, read
+from peers import JUMP
 from trapezoids import Polyline, trapezoids
 
 from cdhr_host.motion.limits import MotionLimits
@@ -25,8 +26,6 @@ from cdhr_host.values import Array
 
 STEPS = 60
 """of constant jerk for each move"""
-JUMP = 5.0 * MM
-"""m/s, the classic scheme's jump of velocity at a corner"""
 FEED = 60.0
 """mm/s of all moves"""
 LONG = 30.0
@@ -94,7 +93,7 @@ class Problem:
     def __init__(self, points: Array, limits: MotionLimits, guess: Guess) -> None:
         self._limits, self._guess = limits, guess
         self._drawn = np.vstack((np.zeros(2), points)) * MM
-        self._vars, self._from, self._held, self._most = [], [], [], []
+        self._vars, self._from, self._held = [], [], []
         self._scale = np.repeat([MM, limits.speed, limits.acceleration], 2)
 
     def duration(self) -> float:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from cdhr_host.motion.cells import Cells
-from cdhr_host.motion.look_ahead import HALVINGS, SPARE, End, ends, feasible, needed
+from cdhr_host.motion.look_ahead import HALVINGS, SPARE, End, change_time, ends, feasible, needed
 from cdhr_host.values import Array, Ints
 
 NEVER = 1e9
@@ -38,12 +38,8 @@ def _time(cells: Cells, both: tuple[End, End], peaks: Array) -> Array:
     """(M, K) s, of no meaning where a cell cannot have these ends."""
     a, j = cells.acceleration, cells.jerk
     with np.errstate(divide="ignore", invalid="ignore"):
-        time = (cells.length - needed(both, peaks, cells)) / peaks
-        for one in both:
-            change = peaks - one.least
-            lasting = np.where(change * j <= a * a, 2 * np.sqrt(change / j), change / a + a / j)
-            time += np.where(change > 0.0, lasting, 0.0)
-    return np.asarray(time, dtype=np.float64)
+        cruising = (cells.length - needed(both, peaks, cells)) / peaks
+        return sum((change_time(peaks - one.least, a, j) for one in both), cruising)
 
 
 def peak_speeds(cells: Cells, both: tuple[End, End]) -> Array:

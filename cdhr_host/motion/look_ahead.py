@@ -35,12 +35,16 @@ CLOSE = 1e-13
 """m, how well a search meets the length of a cell, from below."""
 
 
-def change_distance(v0: Array, v1: Array, a: Array, j: Array) -> Array:
-    """(K,) m: distance of the fastest speed change; infinite where a is 0 and the speeds differ."""
-    d = np.abs(v1 - v0)
+def change_time(d: Array, a: Array, j: Array) -> Array:
+    """m/s -> s: duration of the fastest change by d; infinite where a is 0 and d is not."""
     with np.errstate(divide="ignore", invalid="ignore"):
         time = np.where(d * j <= a * a, 2 * np.sqrt(d / j), d / a + a / j)
-    return np.where(d == 0, 0.0, (v0 + v1) / 2 * np.where(a > 0, time, np.inf))
+    return np.where(d == 0, 0.0, np.where(a > 0, time, np.inf))
+
+
+def change_distance(v0: Array, v1: Array, a: Array, j: Array) -> Array:
+    """(K,) m: distance of the fastest speed change; infinite where a is 0 and the speeds differ."""
+    return np.asarray((v0 + v1) / 2 * change_time(np.abs(v1 - v0), a, j), dtype=np.float64)
 
 
 def reachable(v0: float, length: float, a: float, j: float) -> float:

@@ -133,8 +133,7 @@ def smooth(
     drawn = np.concatenate(([0.0], np.cumsum(lengths)))
     direction = steps / lengths[:, None]
     corner, directions = _corners(direction)
-    last = drawn[-1] if closes else math.inf
-    ends = np.stack((passed + drawn[corner], last - drawn[corner]))
+    ends = np.stack((passed + drawn[corner], (drawn[-1] if closes else math.inf) - drawn[corner]))
     turn = norms(directions[1] - directions[0])
     around = beside(drawn, corner, turn, least=h, allowed=allowed)
     spent = np.zeros(len(points)) if moved is None else moved.spent
@@ -148,19 +147,10 @@ def smooth(
     last = after[-1]
     begin = float(np.min(middle[corner] - rounding.half, initial=-h))
     knots, lasting, kinks = _knots(middle[corner], directions, rounding, np.append(middle[:-1], begin), last)
-    lasting = lasting[:, None]
     segment = np.clip(np.searchsorted(middle, knots, side="right") - 1, 0, len(lengths) - 1)
-    third, straight = kinks.third, kinks.bending == 0
-    second = _before(third * lasting) + kinks.second
-    second = _anchored(second, np.zeros_like(second), straight)
-    initial = direction[0]
-    slope = initial + _before(second * lasting + third * lasting**2 / 2)
-    slope = _anchored(slope, direction[segment], straight)
-    increments = slope * lasting + second * lasting**2 / 2 + third * lasting**3 / 6
-    value = points[0] + begin * initial + _before(increments)
     onwards = points[segment] + (knots - after[segment])[:, None] * direction[segment]
-    value = _anchored(value, onwards, straight)
-    coefficients = np.stack([np.ascontiguousarray(rows.T) for rows in (value, slope, second, third)])
+    begins = points[0] + begin * direction[0], direction[0]
+    coefficients = _coefficients(kinks, lasting[:, None], begins, (onwards, direction[segment]))
     here = np.flatnonzero(np.diff(knots, append=last) > 0)
     known = -math.inf if moved is None else _known(around, corner, moved.firm - 1, drawn)
     if allowed is not None and moved is not None:
@@ -168,6 +158,37 @@ def smooth(
     known = _along(known, drawn, after)
     path = SmoothPath(knots, float(last), coefficients, segment, kinks.bending, kinks.brake, after, known)
     return path if len(here) == len(knots) else path.only(here)
+
+
+@dataclass(frozen=True, slots=True)
+class _Kinks:
+    """What changes from piece to piece."""
+
+    third: Array
+    """(K, 3) q''' on each piece"""
+    second: Array
+    """(K, 3) sum of the jumps of q'' up to each piece"""
+    bending: Ints
+    """(K,) corners whose rounding reaches into the piece"""
+    brake: Array
+    """(2, K) 1/m of the corner there"""
+
+
+def _coefficients(
+    kinks: _Kinks, lasting: Array, begins: tuple[Array, Array], drawn: tuple[Array, Array]
+) -> Array:
+    """(4, 3, K) q and its derivatives at the start of each piece, of lengths (K, 1) m.
+
+    ``begins`` (3,) are q and q' at the first, ``drawn`` (K, 3) on each where the path is straight.
+    """
+    third, straight = kinks.third, kinks.bending == 0
+    second = _before(third * lasting) + kinks.second
+    second = _anchored(second, np.zeros_like(second), straight)
+    slope = begins[1] + _before(second * lasting + third * lasting**2 / 2)
+    slope = _anchored(slope, drawn[1], straight)
+    value = begins[0] + _before(slope * lasting + second * lasting**2 / 2 + third * lasting**3 / 6)
+    value = _anchored(value, drawn[0], straight)
+    return np.stack([np.ascontiguousarray(rows.T) for rows in (value, slope, second, third)])
 
 
 def _known(around: Beside, corner: Ints, edge: int, drawn: Array) -> float:
@@ -232,20 +253,6 @@ def _corners(direction: Array) -> tuple[Ints, tuple[Array, Array]]:
     # Each corner takes along the turns before it that were too small to be one.
     before = around[np.concatenate(([0], bends[:-1] + 1))] if len(bends) else around[:0]
     return bends, (before, around[bends + 1])
-
-
-@dataclass(frozen=True, slots=True)
-class _Kinks:
-    """What changes from piece to piece."""
-
-    third: Array
-    """(K, 3) q''' on each piece"""
-    second: Array
-    """(K, 3) sum of the jumps of q'' up to each piece"""
-    bending: Ints
-    """(K,) corners whose rounding reaches into the piece"""
-    brake: Array
-    """(2, K) 1/m of the corner there"""
 
 
 def _knots(
