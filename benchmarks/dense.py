@@ -7,10 +7,8 @@ curve,
 
     |q'| s' <= F,   |q'' s'² + q' s''| <= A,   |q''' s'³ + 3 q'' s' s'' + q' s'''| <= J.
 
-Where q'' jumps along the path, as beside corners that are braked into, s'' jumps with it, so that
-the acceleration is continuous
-
-and the sum of the durations is least. What comes out is sampled as a motion in time and held to
+and the sum of the durations is least. Where |q'| jumps, at the ends of corners with gears, s' and s'' jump the other
+way, so that speed and acceleration are continuous. What comes out is sampled as a motion in time and held to
 the limits by finite differences; time is then stretched by what is missing, so that the
 reference is a motion that keeps every limit. Not convex: the result is a local optimum, the best
 of those reached from the plan itself and from the plan slowed down.
@@ -41,8 +39,8 @@ SAMPLE_S = 2e-4
 """s, spacing of the finite differences"""
 SLOWER = (1.0, 1.3)
 """Time scales of the plan from which the optimisation starts"""
-JUMP = 1e-3
-"""1/m, less is rounding"""
+JUMP = 1e-6
+"""of |q'|, less is rounding"""
 UNIT_TIME = 0.01
 """s, the unit of durations inside the optimisation"""
 
@@ -96,8 +94,8 @@ def _solved(run: Run, limits: MotionLimits, s: Array, slower: float) -> Referenc
     x = np.array(answer["x"]).ravel()
     rate, change, jerk = x[:n] * limits.speed, x[n : 2 * n] * limits.acceleration, x[2 * n : 3 * n - 1]
     step = x[3 * n - 1 :] * UNIT_TIME
-    jump = (_jumps(run, s) * rate**2)[1:]
-    stretched = _excess(run, limits, (rate[0], change[0], jerk * limits.jerk, jump), step)
+    motion = rate[0], change[0], jerk * limits.jerk, _ratios(run, s)
+    stretched = _excess(run, limits, motion, step)
     t = stretched * np.concatenate(([0.0], np.cumsum(step)))
     return Reference(float(t[-1]), stretched, s, t, bool(solver.stats()["success"]))
 
@@ -115,11 +113,11 @@ _OPTIONS = {
 }
 
 
-def _jumps(run: Run, s: Array) -> Array:
-    """(N,) 1/m: by how many times s'² s'' must jump at each node, for q'' jumps there."""
-    (_, slope, bend, _), (_, _, before, _) = run.at(s), run.at(s, before=True)
-    along = ((before - bend) * slope).sum(axis=1) / np.maximum((slope**2).sum(axis=1), 1e-12)
-    return np.where(np.abs(along) > JUMP, along, 0.0)
+def _ratios(run: Run, s: Array) -> Array:
+    """(N,) s' before each node for s' after it: where |q'| jumps, s' jumps the other way."""
+    before, after = (np.sqrt((run.at(s, before=side)[1] ** 2).sum(axis=1)) for side in (True, False))
+    jumps = np.abs(before - after) > JUMP
+    return np.where(jumps, after / np.maximum(before, JUMP), 1.0)
 
 
 def _guess(run: Run, limits: MotionLimits, s: Array, slower: float) -> Array:
@@ -129,8 +127,8 @@ def _guess(run: Run, limits: MotionLimits, s: Array, slower: float) -> Array:
     when = np.interp(s, np.maximum.accumulate(where), t)
     rate, change = np.interp(when, t, rate) / slower, np.interp(when + SAMPLE_S / 4, t, change) / slower**2
     step = np.maximum(np.diff(when), 1e-5) * slower
-    jumped = np.diff(change) - (_jumps(run, s) * rate**2)[1:]
-    jerk = np.clip(jumped / step / limits.jerk, -1.0, 1.0)
+    arriving = (change * _ratios(run, s))[1:]
+    jerk = np.clip((arriving - change[:-1]) / step / limits.jerk, -1.0, 1.0)
     scaled = rate / limits.speed, change / limits.acceleration, jerk, step / UNIT_TIME
     return np.concatenate(scaled)
 
@@ -151,10 +149,11 @@ class _Problem:
         unknown = casadi.SX.sym("x", 4 * n - 2)
         rate, change = unknown[:n] * limits.speed, unknown[n : 2 * n] * limits.acceleration
         jerk, step = unknown[2 * n : 3 * n - 1] * limits.jerk, unknown[3 * n - 1 :] * UNIT_TIME
-        arriving = change - casadi.DM(_jumps(run, s)) * rate**2
-        ties = _ties(limits, np.diff(s), (rate, change, arriving, jerk), step)
+        ratio = casadi.DM(_ratios(run, s))
+        nodes = (rate, change), (rate * ratio, change * ratio)
+        ties = _ties(limits, np.diff(s), nodes, jerk, step)
         between = rate[:-1] + step * (change[:-1] / 2 + step * jerk / 8)
-        kept = _kept(run, limits, s, (rate, between, (change, arriving), jerk))
+        kept = _kept(run, limits, s, (nodes, between, jerk))
         nlp = {"x": unknown, "f": casadi.sum1(step), "g": casadi.vertcat(ties, kept)}
         zeros, ones = np.zeros(ties.shape[0]), np.ones(kept.shape[0])
         lower, upper = _bounds(run, s)
@@ -175,42 +174,39 @@ def _bounds(run: Run, s: Array) -> tuple[Array, Array]:
     return lower, upper
 
 
-def _ties(limits: MotionLimits, ds: Array, motion: tuple[Any, Any, Any, Any], step: Any) -> Any:
+def _ties(limits: MotionLimits, ds: Array, nodes: Any, jerk: Any, step: Any) -> Any:
     """What constant s''' means for the nodes on either side of each step; 0 when kept.
 
-    ``motion`` is s' at the nodes, s'' after and before them, and jerk.
+    ``nodes`` are s' and s'' after them, and before them.
     """
-    rate, change, arriving, jerk = motion
+    (rate, change), (arriving, changing) = nodes
     v, a = rate[:-1], change[:-1]
     moved = step * (v + step * (a / 2 + step * jerk / 6)) - ds
-    faster = v + step * (a + step * jerk / 2) - rate[1:]
-    harder = a + step * jerk - arriving[1:]
+    faster = v + step * (a + step * jerk / 2) - arriving[1:]
+    harder = a + step * jerk - changing[1:]
     scale = limits.speed * UNIT_TIME
     return casadi.vertcat(moved / scale, faster / limits.speed, harder / limits.acceleration)
 
 
-def _kept(run: Run, limits: MotionLimits, s: Array, motion: tuple[Any, Any, Any, Any]) -> Any:
+def _kept(run: Run, limits: MotionLimits, s: Array, motion: tuple[Any, Any, Any]) -> Any:
     """Squared speed, acceleration and jerk at both ends of each step, as shares of the limits.
 
-    ``motion`` is s' at the nodes, s' half-way in time between them, s'' after and before them, and jerk.
+    ``motion`` is s' and s'' after and before the nodes, s' half-way in time between them, and jerk.
     """
-    rate, between, (change, arriving), jerk = motion
+    nodes, between, jerk = motion
     middle = (s[1:] + s[:-1]) / 2
     piece = np.clip(np.searchsorted(run.s, middle, side="right") - 1, 0, len(run.feed) - 1)
     third, feed = run.curve[3, piece], run.feed[piece]
-    _, slope, bend, _ = run.at(s)
-    ends = (slice(0, -1), bend, change), (slice(1, None), run.at(s, before=True)[2], arriving)
-    fast = (slope**2).sum(axis=1)
-    shares = [
-        _squared([slope, bend], [change, rate**2]) / limits.acceleration**2,
-        np.minimum(fast[1:], fast[:-1]) * between**2 / feed**2,
-    ]
-    for end, bends, changes in ends:
-        shares.append(fast[end] * rate[end] ** 2 / feed**2)
-        terms = [third, 3 * bends[end], slope[end]]
-        factors = [rate[end] ** 3, rate[end] * changes[end], jerk]
+    fast, shares = [], []
+    for end, (rate, change), before in zip((slice(0, -1), slice(1, None)), nodes, (False, True), strict=True):
+        _, slope, bend, _ = run.at(s, before=before)
+        fast.append((slope**2).sum(axis=1)[end])
+        shares.append(_squared([slope, bend], [change, rate**2]) / limits.acceleration**2)
+        shares.append(fast[-1] * rate[end] ** 2 / feed**2)
+        terms = [third, 3 * bend[end], slope[end]]
+        factors = [rate[end] ** 3, rate[end] * change[end], jerk]
         shares.append(_squared(terms, factors) / limits.jerk**2)
-    return casadi.vertcat(*shares)
+    return casadi.vertcat(*shares, np.minimum(*fast) * between**2 / feed**2)
 
 
 def _squared(vectors: list[Array], factors: list[Any]) -> Any:
@@ -225,11 +221,14 @@ def _squared(vectors: list[Array], factors: list[Any]) -> Any:
 
 
 def _driven(start: tuple[float, float, Array, Array], step: Array) -> Array:
-    """(N,) m: s every SAMPLE_S, from s' and s'' at the start, each step's jerk, and jumps of s'' after it."""
-    v, a, j, jump = start
+    """(N,) m: s every SAMPLE_S, from s' and s'' at the start, each step's jerk, and ratios at the nodes."""
+    v, a, j, ratio = start
     begin = _running(0.0, step)
-    change = _running(a, j * step + jump)[:-1]
-    rate = _running(v, step * (change + step * j / 2))[:-1]
+    # In units of the rate at the start, no ratio comes between.
+    unit = np.cumprod(ratio)[:-1] / ratio[0]
+    change = _running(a, j * step * unit)[:-1]
+    rate = _running(v, step * (change + step * j * unit / 2))[:-1]
+    change, rate = change / unit, rate / unit
     s = _running(0.0, step * (rate + step * (change / 2 + step * j / 6)))[:-1]
     t = np.arange(0.0, begin[-1], SAMPLE_S)
     k = np.clip(np.searchsorted(begin, t, side="right") - 1, 0, len(step) - 1)

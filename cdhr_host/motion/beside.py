@@ -1,8 +1,8 @@
 """How far the rounding of each corner may reach along the straights beside it.
 
-A corner needs no more than the way from its feed to rest. Where a straight is long enough, both its
+A corner needs little more than the way from its feed to rest. Where a straight is long enough, both its
 corners have what they need; else they share it, the sharper one getting more. So a corner's room depends
-on no more of the path than twice that way. What is braked ends where the feed changes. A straight
+on no more of the path than twice that. No shape reaches over a change of the feed. A straight
 goes on over points that are no corners.
 """
 
@@ -13,6 +13,8 @@ import numpy as np
 
 from cdhr_host.values import Array, Flags, Ints
 
+SWING = 1.3
+"""Ways from the feed to rest that a corner can make use of: it slows down more gently where it swings out."""
 APART = 1 - 1e-6
 """Of each share, so that between two corners there is always a straight."""
 STOP = 1.2
@@ -35,7 +37,7 @@ class Allowance:
     """m/s³"""
 
     def ways(self) -> Array:
-        """(M,) m from the feed of each segment to rest."""
+        """(M,) m that a corner can make use of on each segment."""
         return way(self.feed, self.acceleration, self.jerk)
 
     def changes(self) -> Flags:
@@ -55,6 +57,8 @@ class Beside:
     """(2, K) m that each has"""
     even: Array
     """(2, K) m of that in which the feed stays"""
+    shared: Flags
+    """(2, K) whether the straight is too short for all that both its ends can make use of"""
     ways: Array
     """(M,) m of straight that a corner can make use of on each segment"""
     least: float
@@ -85,8 +89,9 @@ def beside(drawn: Array, corner: Ints, turn: Array, *, least: float, allowed: Al
     needed = np.minimum(np.stack((ways[corner - 1], ways[corner])), np.maximum(even, 2 * least))
     between = np.diff(at, prepend=drawn[0], append=drawn[-1])
     both = np.concatenate((ways[:1], needed[1])), np.concatenate((needed[0], ways[-1:]))
-    room = _rooms(between, turn, both, least)
-    return Beside(at, needed, room, np.minimum(room, even), ways, least)
+    room, short = _rooms(between, turn, both, least), between < both[0] + both[1]
+    shared = np.stack((short[:-1], short[1:]))
+    return Beside(at, needed, room, np.minimum(room, even), shared, ways, least)
 
 
 def _rooms(between: Array, turn: Array, needed: tuple[Array, Array], least: float) -> Array:
@@ -112,6 +117,7 @@ def _even(drawn: Array, at: Array, changes: Flags) -> Array:
 
 
 def way(speed: Array, acceleration: float, jerk: float) -> Array:
-    """(K,) m/s -> (K,) m from there to rest."""
+    """(K,) m/s -> (K,) m that a corner can make use of at this feed."""
     hard, soft = speed / acceleration + acceleration / jerk, 2 * np.sqrt(speed / jerk)
-    return np.asarray(speed * np.where(speed * jerk > acceleration**2, hard, soft) / 2, dtype=np.float64)
+    rest = speed * np.where(speed * jerk > acceleration**2, hard, soft) / 2
+    return np.asarray(SWING * rest, dtype=np.float64)

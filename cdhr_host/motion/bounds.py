@@ -35,19 +35,19 @@ def leg_bounds(leg: Leg) -> LegBounds:
     """Bounds of a leg, from its time law and path alone."""
     start, speed, change, jerk = leg.law.state
     after = np.diff(leg.law.t, append=leg.law.duration)
-    fastest = np.maximum(speed, speed + after * (change + after * jerk / 2))
+    rate = np.maximum(speed, speed + after * (change + after * jerk / 2))
     harshest = np.maximum(np.abs(change), np.abs(change + after * jerk))
     reached = np.clip((start, np.append(start[1:], leg.law.end)), *leg.law.within)
     rows = _overlapped(leg.path.start, *reached)
     bends = Bends(*(_largest(row, rows) for row in leg.bends.rows))
     segment = leg.path.segment
-    feed = -_largest(-leg.segments.feed[segment], rows)
-    flow = _largest(leg.segments.clay[segment], rows) * fastest
-    acceleration = bends.acceleration(fastest, harshest)
-    jerks = bends.jerk(fastest, harshest, np.abs(jerk))
+    steep, clay = leg.path.steep, leg.segments.clay[segment]
+    acceleration = bends.acceleration(rate, harshest)
+    jerks = bends.jerk(rate, harshest, np.abs(jerk))
+    flow = rate * _largest(clay * steep, rows)
     return LegBounds(
-        float(fastest.max()),
-        float((fastest / feed).max()),
+        float((rate * _largest(steep, rows)).max()),
+        float((rate * _largest(steep / leg.segments.feed[segment], rows)).max()),
         float(acceleration.max()),
         float(jerks.max()),
         float(flow.max()),

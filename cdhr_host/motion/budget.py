@@ -128,27 +128,20 @@ class Menu:
         row, column = np.argmax(self.speed >= enough, axis=0), np.arange(len(cap))
         return self.speed[row, column], self.share[row, column]
 
-    def settled(self, which: Ints, speed: Array, share: Array) -> "Menu":
-        """With only the one way given (K,), in some of the stretches."""
-        speeds, shares = self.speed.copy(), self.share.copy()
-        speeds[:, which], shares[:, which] = speed[which], share[which]
-        return Menu(speeds, shares)
-
 
 def menu(  # noqa: PLR0917 -- a column each
-    cap: Array, room: Array, bends: Bends, long: Flags, braked: Flags, limits: MotionLimits
+    cap: Array, room: Array, bends: Bends, long: Flags, shaped: Flags, limits: MotionLimits
 ) -> Menu:
     """Speeds, and shares of the limits that may be spent on changing them, of each of K stretches.
 
     ``cap`` (K,) m/s is wanted; ``room`` (K,) of the acceleration is what the cables leave of it. ``long``
-    stretches must let the speed change. Corners that are braked into (``braked``) have their change of
-    speed in their path.
+    stretches must let the speed change. Corners with a ``shape`` have their change of speed in their path.
     """
     straight = bends.second == 0
     steady = np.minimum(cap, bends.speed(0.0, limits, room))
     speed = np.tile(steady, (len(SHARES), 1))
     share = np.tile(np.where(straight, 1.0, 0.0), (len(SHARES), 1))
-    slower = np.flatnonzero(~straight & ~braked)
+    slower = np.flatnonzero(~straight & ~shaped)
     for row, candidate in enumerate(SHARES):
         reached = np.minimum(cap[slower], bends.only(slower).speed(candidate, limits, room[slower]))
         speed[row:, slower], share[row:, slower] = reached, candidate

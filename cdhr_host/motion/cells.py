@@ -2,8 +2,8 @@
 
 Whatever a time law does inside the bounds of a cell, the nozzle keeps its limits there. A
 straight cell gives the whole of them to s'' and s'''; a bent one keeps a part for turning.
-At the borders of cells s'' = 0, but beside corners that are braked into: so they are as long
-as their bounds are alike.
+At the borders of cells s'' = 0: so they are as long as their bounds are alike. A corner with a shape
+(``motion.swings``) is a cell in which s' stays the same; where it begins and ends |q'| is less than 1, its gears.
 """
 
 from dataclasses import dataclass
@@ -57,8 +57,8 @@ class Cells:
     """m in s: cells up to it keep their bounds whatever path follows"""
     bent: Flags
     """(K,) whether the cell lies in a long bend"""
-    pulls: Array
-    """(2, K) 1/m: at its start s'' is pulls[0] s'², at its end -pulls[1] s'²"""
+    gear: Array
+    """(2, K) |q'| at its start and at its end: the nozzle's speed there, of s' within it"""
 
     @property
     def several(self) -> Flags:
@@ -76,7 +76,7 @@ class Cells:
             self.jerk[:, which],
             self.settled,
             self.bent[which],
-            self.pulls[:, which],
+            self.gear[:, which],
         )
 
 
@@ -95,16 +95,17 @@ class _Stretches:
     """share of the acceleration that the cables leave"""
     bends: Bends
     bent: Flags
-    brake: Array
+    gear: Array
+    """as in the path"""
     run: Ints
     """number of the bend or straight"""
     long: Flags
     """whether that is a long bend"""
 
     @property
-    def braked(self) -> Flags:
-        """Whether it is a corner that is braked into."""
-        return np.asarray(self.brake.any(axis=0), dtype=np.bool_)
+    def shaped(self) -> Flags:
+        """Whether it is a corner with a shape."""
+        return self.gear[0] > 0.0
 
 
 def cells(
@@ -128,10 +129,11 @@ def cells(
     what could be braked from a border still can.
     """
     h = limits.half_width
-    pieces = _between(path, bends, (np.minimum(feed, limits.speed), *share), span, h=h, at_ends=long)
+    rate = np.minimum(feed, limits.speed) / path.steep
+    pieces = _between(path, bends, (rate, *share), span, h=h, at_ends=long)
     rows = _rows(pieces, h, passed)
     cap = np.minimum(rows.cap, _pushed_speed(rows, limits))
-    ways = menu(cap, rows.room, rows.bends, rows.long, rows.braked, limits).within(rows.spend)
+    ways = menu(cap, rows.room, rows.bends, rows.long, rows.shaped, limits).within(rows.spend)
     speed, spent = ways.usual(rows.long, cap)
     held_up = rows.long & (speed < cap)
     heads, settled = _alike(rows, speed, spent, h, (passed, _begun(path, span[0])))
@@ -140,11 +142,10 @@ def cells(
     speed, spent = (np.minimum.reduceat(each, heads) for each in (speed, spent))
     spent, last = _levelled(rows, speed, spent, passed, settled if open_end else np.inf)
     apart = np.where(np.maximum.reduceat(held_up, heads), np.arange(len(heads)), -1)
-    heads = _heads(speed, spent, *rows.brake, _multiples(rows.start + passed, _longest(speed)), apart)
-    rows, ways, pulls = _merged(rows, heads), ways.least(heads), _pulls(rows.brake[:, heads])
-    ways = ways.settled(np.flatnonzero(pulls.any(axis=0)), speed[heads], spent[heads])
-    a, j = ways.share * limits.acceleration, ways.share * limits.jerk
-    return Cells(rows.start, rows.length, ways.speed, a, j, min(span[1], last), rows.long, pulls)
+    heads = _heads(speed, spent, *rows.gear, _multiples(rows.start + passed, _longest(speed)), apart)
+    rows, ways = _merged(rows, heads), ways.least(heads)
+    a, j, gear = ways.share * limits.acceleration, ways.share * limits.jerk, np.where(rows.shaped, rows.gear, 1.0)
+    return Cells(rows.start, rows.length, ways.speed, a, j, min(span[1], last), rows.long, gear)
 
 
 def _pushed_speed(rows: _Stretches, limits: MotionLimits) -> Array:
@@ -153,19 +154,13 @@ def _pushed_speed(rows: _Stretches, limits: MotionLimits) -> Array:
     A corner turned by theta is cut, so that |q'| falls to cos(theta/2) in its middle: along the path
     q'' is up to |q''| sin(theta/2). A corner with the usual kernel has sin(theta/2) = |q''| h/2, a
     wider kernel of its own (h = 2 h0/theta) about the root of |q''| h0/2, which is the greater one.
-    Corners that are braked into keep to the air's share as they are.
+    Shapes are made only where the air's share is the whole.
     """
     bend = rows.bends.second
     with np.errstate(divide="ignore"):
         sine = np.sqrt(np.minimum(1.0, bend * limits.half_width / 2.0))
         found = np.sqrt(rows.spend * limits.acceleration / (bend * sine))
-    return np.where(rows.braked, np.inf, found)
-
-
-def _pulls(brake: Array) -> Array:
-    """(2, K) -> (2, K): what the straights beside corners that are braked into must meet at their ends."""
-    beside = np.stack((np.append(0.0, brake[1, :-1]), np.append(brake[0, 1:], 0.0)))
-    return np.where(brake.any(axis=0), 0.0, beside)
+    return np.where(rows.shaped, np.inf, found)
 
 
 def _between(
@@ -184,15 +179,15 @@ def _between(
     used = np.flatnonzero((ends > first) & (path.start < span[1]))
     start = np.maximum(path.start[used], span[0])
     length = np.minimum(ends[used], span[1]) - start
-    bent, brake = path.bending[used] > 0, path.brake[:, used]
-    braked = np.asarray(brake.any(axis=0), dtype=np.bool_)
-    run = np.cumsum((np.diff(bent, prepend=bent[0]) != 0) | (np.diff(braked, prepend=braked[0]) != 0))
+    bent, gear = path.bending[used] > 0, path.gear[:, used]
+    shaped = gear[0] > 0.0
+    run = np.cumsum((np.diff(bent, prepend=bent[0]) != 0) | (np.diff(shaped, prepend=shaped[0]) != 0))
     heads = np.flatnonzero(np.diff(run, prepend=-1))
     long = bent & (np.add.reduceat(length, heads)[run] > LONG_RUN * h)
     begins, finishes = start[heads][run], np.append(start[heads[1:]], span[1])[run]
     long |= bent & ((begins <= span[0] + at_ends[0]) | (finishes >= span[1] - at_ends[1]))
     return _Stretches(
-        start, length, feed[used], share[used], room[used], bends.only(used), bent, brake, run, long & ~braked
+        start, length, feed[used], share[used], room[used], bends.only(used), bent, gear, run, long & ~shaped
     )
 
 
@@ -228,7 +223,7 @@ def _merged(rows: _Stretches, heads: Ints) -> _Stretches:
         np.minimum.reduceat(rows.room, heads),
         rows.bends.largest(heads),
         rows.bent[heads],
-        rows.brake[:, heads],
+        rows.gear[:, heads],
         rows.run[heads],
         rows.long[heads],
     )
@@ -237,7 +232,7 @@ def _merged(rows: _Stretches, heads: Ints) -> _Stretches:
 def _begun(path: SmoothPath, s: float) -> bool:
     """Whether a bend has begun before a place."""
     piece = int(np.searchsorted(path.start, s - TOUCHING, side="right")) - 1
-    return piece >= 0 and bool(path.bending[piece] > 0 and not path.brake[:, piece].any())
+    return piece >= 0 and bool(path.bending[piece] > 0 and not path.gear[0, piece])
 
 
 def _alike(
@@ -275,7 +270,7 @@ def _levelled(
 
     And where the last of these begins that may go on beyond what is ``settled`` (m), or else that.
     """
-    free = (share >= FREE) & (rows.bent | (rows.length < SHORT)) & ~rows.braked
+    free = (share >= FREE) & (rows.bent | (rows.length < SHORT)) & ~rows.shaped
     heads = _heads(free, speed, _multiples(rows.start + passed, _longest(speed)))
     count = np.diff(np.append(heads, len(share)))
     least = np.repeat(np.minimum.reduceat(share, heads), count)

@@ -287,9 +287,6 @@ class LegPlanner:
 
 
 def _settled(found: Cells, forward: Array) -> int:
-    """How many cells can be committed: up to a border with way enough to brake, whatever follows.
-
-    A straight after a corner that is braked into stays with that corner.
-    """
-    usable = np.flatnonzero(stoppable(found, forward)[:-1] & (found.pulls[0] == 0.0))
+    """How many cells can be committed: up to a border with way enough to brake, whatever follows."""
+    usable = np.flatnonzero(stoppable(found, forward)[:-1])
     return int(usable[-1]) if len(usable) else 0

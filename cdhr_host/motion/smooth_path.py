@@ -52,9 +52,11 @@ class SmoothPath:
     """(K,) drawn segment each piece follows"""
     bending: Ints
     """(K,) corners whose kernel reaches into the piece; 0 where the path is straight"""
-    brake: Array
-    """(2, K) 1/m, in corners that are braked into: by how much more s'' shrinks on the straight before,
-    and grows on the one after, than s'² would make it"""
+    gear: Array
+    """(2, K) |q'| where the corner begins, and where it ends, that a piece belongs to, if its rounding is a shape
+    (``motion.swings``); 0 elsewhere"""
+    steep: Array
+    """(K,) greatest |q'|"""
     drawn: Array
     """(M+1,) m, s from which each drawn segment goes on straight; for the last point, its end"""
     known: float
@@ -62,9 +64,10 @@ class SmoothPath:
 
     def only(self, which: Ints) -> "SmoothPath":
         """With some of the pieces; between them lies nothing that digits can tell."""
-        start, bending, brake = self.start[which], self.bending[which], self.brake[:, which]
-        pieces = self.coefficients[:, :, which], self.segment[which], bending, brake
-        return SmoothPath(start, self.end, *pieces, self.drawn, self.known)
+        start, bending = self.start[which], self.bending[which]
+        pieces = self.coefficients[:, :, which], self.segment[which], bending
+        shape = self.gear[:, which], self.steep[which]
+        return SmoothPath(start, self.end, *pieces, *shape, self.drawn, self.known)
 
     def lengths(self) -> Array:
         """(K,) m: length in s of each piece."""
@@ -139,13 +142,13 @@ def smooth(
     spent = np.zeros(len(points)) if moved is None else moved.spent
     widths = Widths(h, h - 3.0 * spent[corner], ends, drawn[(spent > 0.0) | _changes(allowed, len(points))])
     single = turns(around, turn, widths)
-    rounding = roundings(single, around.even, corner, widths, allowed)
+    rounding = roundings(single, around, corner, widths, allowed)
     saved = np.zeros((2, len(points)))
     saved[:, corner] = rounding.saved
     after = drawn + np.cumsum(saved.sum(axis=0))
     middle = after - saved[1]
     last = after[-1]
-    begin = float(np.min(middle[corner] - rounding.half, initial=-h))
+    begin = float(np.min(middle[corner] - rounding.half[0], initial=-h))
     knots, lasting, kinks = _knots(middle[corner], directions, rounding, np.append(middle[:-1], begin), last)
     segment = np.clip(np.searchsorted(middle, knots, side="right") - 1, 0, len(lengths) - 1)
     onwards = points[segment] + (knots - after[segment])[:, None] * direction[segment]
@@ -156,7 +159,8 @@ def smooth(
     if allowed is not None and moved is not None:
         known = _firm(single, known, float(drawn[moved.firm - 1]), drawn, h=h, allowed=allowed)
     known = _along(known, drawn, after)
-    path = SmoothPath(knots, float(last), coefficients, segment, kinks.bending, kinks.brake, after, known)
+    shape = kinks.gear, kinks.steep
+    path = SmoothPath(knots, float(last), coefficients, segment, kinks.bending, *shape, after, known)
     return path if len(here) == len(knots) else path.only(here)
 
 
@@ -166,12 +170,14 @@ class _Kinks:
 
     third: Array
     """(K, 3) q''' on each piece"""
-    second: Array
-    """(K, 3) sum of the jumps of q'' up to each piece"""
+    slope: Array
+    """(K, 3) sum of the jumps of q' up to each piece"""
     bending: Ints
     """(K,) corners whose rounding reaches into the piece"""
-    brake: Array
-    """(2, K) 1/m of the corner there"""
+    gear: Array
+    """(2, K) as in the path"""
+    steep: Array
+    """(K,) as in the path"""
 
 
 def _coefficients(
@@ -182,9 +188,9 @@ def _coefficients(
     ``begins`` (3,) are q and q' at the first, ``drawn`` (K, 3) on each where the path is straight.
     """
     third, straight = kinks.third, kinks.bending == 0
-    second = _before(third * lasting) + kinks.second
+    second = _before(third * lasting)
     second = _anchored(second, np.zeros_like(second), straight)
-    slope = begins[1] + _before(second * lasting + third * lasting**2 / 2)
+    slope = begins[1] + kinks.slope + _before(second * lasting + third * lasting**2 / 2)
     slope = _anchored(slope, drawn[1], straight)
     value = begins[0] + _before(slope * lasting + second * lasting**2 / 2 + third * lasting**3 / 6)
     value = _anchored(value, drawn[0], straight)
@@ -260,31 +266,45 @@ def _knots(
 ) -> tuple[Array, Array, _Kinks]:
     """Piece starts and lengths (K,), and what is on each.
 
-    Pieces begin where a rounding does, at its middle and end, and ``also`` elsewhere.
+    Pieces begin where a rounding does, where its q''' changes, at its end, and ``also`` elsewhere.
     """
-    (before, after), half, brake = turns, rounding.half, rounding.brake
+    inner, (before, after) = rounding.inner, rounding.half
     exact = middle.astype(np.longdouble)
-    at = np.concatenate((exact - half, exact, exact + half, also))
-    first, second = (old[:, None] * before + new[:, None] * after for old, new in rounding.third)
-    none = np.zeros((len(also), 3))
+    at = np.concatenate((exact - before, exact, exact + after, exact[inner.corner] + inner.at, also))
     order = np.argsort(at, kind="stable")
     at = np.clip(at[order], also[-1], last)
     keep = np.diff(at, append=last) > 0
-    one = np.ones(len(half))
-    active = np.cumsum(np.concatenate((one, 0 * one, -one, none[:, 0]))[order])
-    third = _summed(np.concatenate((first, second - first, -second, none))[order])
-    third[active == 0] = 0.0
-    entering, leaving = brake[:, :, None]
-    jump, braked = np.zeros_like(third), np.zeros((2, len(at)))
-    if brake.any():
-        jumps = np.concatenate((-entering * before, 0 * first, -leaving * after, none))
-        jump = np.cumsum(jumps[order], axis=0)
-        braking = np.concatenate((brake, 0 * brake, -brake, np.zeros((2, len(also)))), axis=1)
-        braked = np.where(active > 0, np.cumsum(braking[:, order], axis=1), 0.0)
-    bending = active.astype(np.int64)
+    one, rest = np.ones(len(middle), np.int64), np.zeros(len(inner.at) + len(also), np.int64)
+    bending = np.cumsum(np.concatenate((one, 0 * one, -one, rest))[order])
+    third = _summed(_steps(turns, rounding, len(also))[order])
+    third[bending == 0] = 0.0
+    slope, gear, steep = np.zeros_like(third), np.zeros((2, len(at))), np.ones(len(at))
+    if rounding.shaped.any():
+        number = np.where(rounding.shaped, np.arange(1, len(middle) + 1), 0)
+        of = np.cumsum(np.concatenate((number, 0 * number, -number, rest))[order])
+        later = np.cumsum(np.concatenate((0 * number, number, -number, rest))[order])
+        within = np.flatnonzero(of)
+        gear[:, within] = rounding.gear[:, of[within] - 1]
+        steep[within] = rounding.steep[(later[within] > 0).astype(np.int64), of[within] - 1]
+        slope = np.cumsum(_jumps(turns, rounding, len(rest))[order], axis=0)
     lengths = np.diff(at[keep], append=last).astype(np.float64)
-    kinks = _Kinks(third[keep], jump[keep], bending[keep], braked[:, keep])
+    kinks = _Kinks(third[keep], slope[keep], bending[keep], gear[:, keep], steep[keep])
     return at[keep].astype(np.float64), lengths, kinks
+
+
+def _jumps(turns: tuple[Array, Array], rounding: Rounding, rest: int) -> Array:
+    """(E, 3): by how much q' jumps at begins, middles, ends, and at the ``rest``."""
+    (before, after), (first, final) = turns, rounding.gear[:, :, None]
+    return np.concatenate(((first - 1) * before, 0 * before, (1 - final) * after, np.zeros((rest, 3))))
+
+
+def _steps(turns: tuple[Array, Array], rounding: Rounding, also: int) -> Array:
+    """(E, 3) 1/m²: by how much q''' changes at begins, middles, ends, between them, and ``also`` elsewhere."""
+    (before, after), inner = turns, rounding.inner
+    steps = [old[:, None] * before + new[:, None] * after for old, new in rounding.step]
+    old, new = inner.step[:, :, None]
+    steps.append(old * before[inner.corner] + new * after[inner.corner])
+    return np.concatenate((*steps, np.zeros((also, 3))))
 
 
 def _before(increments: Array) -> Array:

@@ -15,17 +15,13 @@ _request.current_position = [0.0]
 _answer = ruckig.Trajectory(1)
 
 
-def speed_change(
-    v0: float, v1: float, a: float, j: float, ends: tuple[float, float] = (0.0, 0.0)
-) -> tuple[list[float], list[float]]:
+def speed_change(v0: float, v1: float, a: float, j: float) -> tuple[list[float], list[float]]:
     """m/s, m/s, m/s², m/s³ -> durations (s) and jerks (m/s³) of the fastest change from v0 to v1.
 
-    ``ends`` are the accelerations (m/s²) at both ends. Raises MotionError with the input that failed.
+    The acceleration is zero at both ends. Raises MotionError with the input that failed.
     """
-    _request.current_acceleration, _request.target_acceleration = [ends[0]], [ends[1]]
     _request.current_velocity, _request.target_velocity = [v0], [v1]
-    most = max(a, abs(ends[0]), abs(ends[1]))  # an end at the limit may be beyond it by rounding
-    _request.max_acceleration, _request.max_jerk = [most], [j]
+    _request.max_acceleration, _request.max_jerk = [a], [j]
     try:
         result = _solver.calculate(_request, _answer)
     except ruckig.RuckigError as error:

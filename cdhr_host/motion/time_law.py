@@ -7,7 +7,7 @@ import numpy as np
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.motion.cells import Cells
 from cdhr_host.motion.choice import chosen
-from cdhr_host.motion.look_ahead import ends
+from cdhr_host.motion.look_ahead import inside
 from cdhr_host.motion.speed_change import speed_change
 from cdhr_host.units import MM
 from cdhr_host.values import Array
@@ -48,25 +48,21 @@ class TimeLaw:
 
 
 def time_law(cells: Cells, borders: Array) -> TimeLaw:
-    """Fastest law through the cells with the given border speeds (K+1,), s'' = 0 at each border.
+    """Fastest law through the cells with the nozzle's speeds (K+1,) at borders, s'' = 0 at each.
 
     In each cell the speed rises to a peak, cruises, and falls to the next border.
     """
     cells, peaks = chosen(cells, borders)
-    both = ends(cells, borders)
+    begin, end = inside(cells, borders)
     duration = np.zeros((len(peaks), 7))
     jerk = np.zeros((len(peaks), 7))
-    a0, a1 = both[0].change, both[1].change
-    none = np.zeros(len(peaks))
-    _change(duration[:, :3], jerk[:, :3], (borders[:-1], peaks), (a0, none), cells)
-    _change(duration[:, 4:], jerk[:, 4:], (peaks, borders[1:]), (none, -a1), cells)
-    way = _way(duration[:, :3], jerk[:, :3], borders[:-1], a0) + _way(
-        duration[:, 4:], jerk[:, 4:], peaks, none
-    )
+    _change(duration[:, :3], jerk[:, :3], (begin, peaks), cells)
+    _change(duration[:, 4:], jerk[:, 4:], (peaks, end), cells)
+    way = _way(duration[:, :3], jerk[:, :3], begin) + _way(duration[:, 4:], jerk[:, 4:], peaks)
     _check(way - cells.length)
     duration[:, 3] = np.maximum(cells.length - way, 0.0) / peaks
     last = float(cells.start[-1] + cells.length[-1])
-    return _integrated(cells.start, (borders[:-1], a0), last, duration, jerk)
+    return _integrated(cells.start, begin, last, duration, jerk)
 
 
 def _check(over: Array) -> None:
@@ -81,33 +77,29 @@ def _check(over: Array) -> None:
         )
 
 
-def _change(
-    duration: Array, jerk: Array, speed: tuple[Array, Array], change: tuple[Array, Array], cells: Cells
-) -> None:
-    """Fill in the three pieces (K, 3) of each cell whose speed changes, with s'' at both ends of that."""
-    (v0, v1), (a0, a1) = speed, change
+def _change(duration: Array, jerk: Array, speed: tuple[Array, Array], cells: Cells) -> None:
+    """Fill in the three pieces (K, 3) of each cell whose speed changes."""
+    v0, v1 = speed
     for k in np.flatnonzero(v0 != v1).tolist():
         a, j = float(cells.acceleration[0, k]), float(cells.jerk[0, k])
-        t, jerks = speed_change(float(v0[k]), float(v1[k]), a, j, (float(a0[k]), float(a1[k])))
+        t, jerks = speed_change(float(v0[k]), float(v1[k]), a, j)
         duration[k], jerk[k] = t[:3], jerks[:3]
 
 
-def _way(duration: Array, jerk: Array, v: Array, a: Array) -> Array:
-    """(K,) m: the way of pieces (K, 3) from speed v and s'' (K,)."""
-    way = np.zeros(len(v))
+def _way(duration: Array, jerk: Array, v: Array) -> Array:
+    """(K,) m: the way of pieces (K, 3) from speed v (K,) with s'' = 0."""
+    way, a = np.zeros((2, len(v)))
     for x, j in zip(duration.T, jerk.T, strict=True):
         way += x * (v + x * (a / 2 + x * (j / 6)))
         v, a = v + x * (a + x * (j / 2)), a + x * j
     return way
 
 
-def _integrated(
-    begin: Array, first: tuple[Array, Array], last: float, duration: Array, jerk: Array
-) -> TimeLaw:
-    """Pieces (K, 7) of each cell, from its start s, s' and s'' (K,), as one law ending at s = last."""
+def _integrated(begin: Array, speed: Array, last: float, duration: Array, jerk: Array) -> TimeLaw:
+    """Pieces (K, 7) of each cell, from its start s and s' (K,), as one law ending at s = last."""
     state = np.zeros((4, *duration.shape))
     state[0, :, 0], state[3] = begin, jerk
-    state[1, :, 0], state[2, :, 0] = first
+    state[1, :, 0] = speed
     for i in range(6):
         x, (s, v, a, j) = duration[:, i], state[:, :, i]
         state[0, :, i + 1] = s + x * (v + x * (a / 2 + x * (j / 6)))

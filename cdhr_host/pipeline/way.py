@@ -67,7 +67,10 @@ class Way:
 
 
 def places(leg: Leg, turns: Turns) -> Array:
-    """(M,) m: places so near to each other that the cubics between them are good."""
+    """(M,) m: places so near to each other that the cubics between them are good.
+
+    Where q' jumps, at the ends of corners with gears, there are two, so that each cubic has the slope on its side.
+    """
     start, (first, last) = leg.path.start, (leg.law.within[0, 0], leg.law.within[1, -1])
     inside = slice(
         max(int(np.searchsorted(start, first, side="right")) - 1, 0),
@@ -80,7 +83,10 @@ def places(leg: Leg, turns: Turns) -> Array:
     count = np.maximum(asked, 1.0).astype(np.int64)
     whole = np.repeat(np.arange(len(count)), count)
     part = np.arange(len(whole)) - (np.cumsum(count) - count)[whole]
-    return np.append(borders[whole] + part * (widths / count)[whole], last)
+    even = borders[whole] + part * (widths / count)[whole]
+    gear = leg.path.gear[:, inside]
+    jumps = borders[1:-1][(np.diff(gear, axis=1) != 0.0).any(axis=0)]
+    return np.sort(np.concatenate((even, np.nextafter(jumps, -np.inf), [last])))
 
 
 def way(rig: Rig, leg: Leg, s: Array) -> Way:

@@ -10,15 +10,7 @@ from hypothesis import strategies as st
 from cdhr_host.errors import MotionError
 from cdhr_host.motion.cells import Cells
 from cdhr_host.motion.choice import chosen
-from cdhr_host.motion.look_ahead import (
-    _below_peak,
-    border_speeds,
-    change_distance,
-    end,
-    ends,
-    needed,
-    reachable,
-)
+from cdhr_host.motion.look_ahead import border_speeds, change_distance, inside, needed, reachable, stoppable
 from cdhr_host.motion.speed_change import speed_change
 from cdhr_host.motion.time_law import time_law
 
@@ -29,7 +21,7 @@ def distance(v0, v1, a, j):
     return float(change_distance(np.array([v0]), np.array([v1]), np.array([a]), np.array([j]))[0])
 
 
-def cells(length, speed, a, j, pulls=None):
+def cells(length, speed, a, j, gear=None):
     """Cells with one way each, or M where the limits are given as (M, K)."""
     length = np.asarray(length, float)
     start = np.concatenate(([0.0], np.cumsum(length)[:-1]))
@@ -37,8 +29,8 @@ def cells(length, speed, a, j, pulls=None):
     limits = [np.atleast_1d(np.asarray(x, float)) for x in (speed, a, j)]
     ways = max(x.shape[0] if x.ndim == 2 else 1 for x in limits)
     columns = (np.broadcast_to(x, (ways, len(length))) for x in limits)
-    pulls = np.zeros((2, len(length))) if pulls is None else np.asarray(pulls, float)
-    return Cells(start, length, *columns, float(length.sum()), bent, pulls)
+    gear = np.ones((2, len(length))) if gear is None else np.asarray(gear, float)
+    return Cells(start, length, *columns, float(length.sum()), bent, gear)
 
 
 @given(SPEED, SPEED)
@@ -128,31 +120,28 @@ def each_way(found):
         yield cells(found.length, *limits)
 
 
-@given(
-    st.lists(
-        st.tuples(st.floats(1e-3, 0.05), SPEED, st.floats(0, 2e3), st.floats(0, 2e3)), min_size=1, max_size=9
-    )
-)
-def test_straights_between_braked_corners_can_be_driven(rows):
-    """Corners of constant speed between straights that must begin or end with s'' = pull s'²."""
-    length, speed, before, after = (np.array(column) for column in zip(*rows, strict=True))
+GEAR = st.floats(0.05, 1.0)
+
+
+@given(st.lists(st.tuples(st.floats(1e-3, 0.05), SPEED, SPEED, GEAR, GEAR), min_size=2, max_size=9))
+def test_straights_between_corners_with_gears_can_be_driven(rows):
+    """Corners run through at one s', which stands for another speed of the nozzle at either end."""
+    length, speed, corner, *gears = (np.array(column) for column in zip(*rows, strict=True))
     a, j, none = 0.5, 5.0, np.zeros(len(rows))
-    corner = np.full(len(rows), 0.03)
-    # No pull exceeds the straight's acceleration at the speed the corner allows.
-    pulls = np.minimum(np.stack((np.append(0.0, after[:-1]), before)), a / corner**2)
-    pulls[1, -1] = 0.0
     columns = (length, none + 1e-3), (speed, corner), (none + a, none), (none + j, none)
     rows = [np.column_stack(pair).ravel()[:-1] for pair in columns]
-    found = cells(*rows, [np.column_stack((pull, none)).ravel()[:-1] for pull in pulls])
+    gear = np.stack([np.column_stack((none + 1, each)).ravel()[:-1] for each in gears])
+    found = cells(*rows, gear)
     speeds, forward = border_speeds(found, 0.0, 0.0)
-    both = ends(found, speeds)
     assert (speeds <= forward * (1 + 1e-12)).all()
-    assert np.array_equal(speeds[1:-1:2], speeds[2::2])
     assert (speeds[1:-1] > 0.0).all()
+    begin, end = inside(found, speeds)
+    assert np.array_equal(begin[1::2], end[1::2])
+    assert begin * gear[0] == pytest.approx(speeds[:-1], rel=1e-10)
+    assert end * gear[1] == pytest.approx(speeds[1:], rel=1e-10)
     _, peaks = chosen(found, speeds)
-    assert (needed(both, peaks, found)[0] <= found.length * (1 + 1e-9) + 1e-12).all()
+    assert (needed((begin, end), peaks, found)[0] <= found.length * (1 + 1e-9) + 1e-12).all()
     assert (peaks <= found.speed[0] * (1 + 1e-9)).all()
-    assert (np.maximum(both[0].peak, both[1].peak) <= peaks * (1 + 1e-9)).all()
     law = time_law(found, speeds)
     after = np.diff(law.t, append=law.duration)
     s, v, change, jerk = law.state
@@ -161,6 +150,14 @@ def test_straights_between_braked_corners_can_be_driven(rows):
     assert (v > -1e-12).all()
     end = s + after * (v + after * (change / 2 + after * jerk / 6))
     assert np.abs(end - np.append(s[1:], law.end)).max() < 1e-8
+
+
+def test_what_is_slowed_down_to_through_gears_can_be_stopped_from():
+    # 20 times 0.7 and over 0.7 again must not look slower than what it was.
+    gear = np.tile([[1.0, 0.3], [1.0, 0.7]], 20)
+    found = cells(np.tile([0.05, 1e-3], 20), 0.1, np.tile([0.5, 0.0], 20), np.tile([5.0, 0.0], 20), gear)
+    _, forward = border_speeds(found, 0.0, 0.1)
+    assert stoppable(found, forward)[:-2].all()
 
 
 def test_given_entry_and_exit_are_kept():
@@ -173,21 +170,6 @@ def test_given_entry_and_exit_are_kept():
 def test_impossible_change_names_its_input():
     with pytest.raises(MotionError, match=r"0\.1 to 0\.2"):
         speed_change(0.1, 0.2, -1.0, 5.0)
-
-
-@given(st.floats(1e-6, 0.3), st.floats(0.0, 1e9))
-def test_an_end_that_leads_to_a_peak_is_found_however_strongly_it_pulls(peak, pull):
-    speed = _below_peak(np.array([peak]), np.array([pull]), np.array([5.0]))
-    assert end(speed, np.array([pull]), np.array([5.0])).peak[0] == pytest.approx(peak, rel=1e-12)
-
-
-def test_a_nozzle_all_but_at_rest_in_a_corner_needs_way_to_come_out_of_it():
-    # From 1 mm/s with s'' = 0.39 m/s² the speed rises to 16 mm/s, whatever comes then.
-    pulls = [[3.5e5, 0.0, 1300.0, 0.0], [0.0, 1300.0, 0.0, 0.0]]
-    found = cells([1.4e-3, 1e-3, 4e-3, 5e-3], 0.03, 0.5, 5.0, pulls)
-    speeds, _ = border_speeds(found, 1.06e-3, 0.0)
-    both = ends(found, speeds)
-    assert (needed(both, chosen(found, speeds)[1], found)[0] <= found.length * (1 + 1e-9)).all()
 
 
 def test_a_change_of_speed_for_which_there_is_no_way_is_refused():
