@@ -4,15 +4,15 @@
 
 Six pieces of constant jerk, three before the corner's middle and three after it, lead from a straight
 passed at one speed to one passed at another. Each shape is the solution of a nonlinear program: least time
-less the way at these speeds, within the tolerance of both straights and the limits. Lengths, times and speeds are
-in units that make acceleration and jerk 1. What is found here needs not be exact: the planner closes each
-shape and scales it until it keeps every limit (``motion.corner``).
+less the way at these speeds, within the tolerance of both straights and the limits. Lengths, times and
+speeds are in units that make acceleration and jerk 1. What is found here needs not be exact: the planner
+closes each shape and scales it until it keeps every limit (``motion.swings``).
 """
 
 import argparse
 import multiprocessing
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from itertools import product
 from pathlib import Path
 
@@ -29,7 +29,7 @@ RIGHT = ANGLES.index(90)
 SPEEDS = tuple(np.geomspace(0.12, 2.6, 18))
 """of acceleration²/jerk"""
 WORTHS = (0.6, 0.06)
-"""What a way is worth beyond the time it takes at its speed, of that time: where room is short, and where not"""
+"""What a way is worth beyond the time it takes at its speed, of that time: with little room, and with much"""
 TOLERANCE = 0.05
 """of acceleration³/jerk²: 0.25 mm with 500 mm/s² and 5000 mm/s³"""
 HALF = 3
@@ -43,14 +43,17 @@ LONGEST, HARDEST, FARTHEST = 8.0, 60.0, 80.0
 
 
 class ShapeProgram:
-    """The nonlinear program of one shape; its parameters are angle, two speeds and two worths."""
+    """The nonlinear program of one shape.
+
+    Its parameters are angle, two speeds, two worths, and whether it may swing out.
+    """
 
     def __init__(self) -> None:
         self._held, self._least, self._most = [], [], []
         n = 2 * HALF
         self._lasting, self._jerk = casadi.SX.sym("t", n), casadi.SX.sym("j", n, 2)
-        self._reach, given = casadi.SX.sym("r"), casadi.SX.sym("p", 5)
-        self._angle, self._speed = given[0], (given[1], given[2])
+        self._reach, given = casadi.SX.sym("r"), casadi.SX.sym("p", 6)
+        self._angle, self._speed, self._swings = given[0], (given[1], given[2]), given[5]
         after = self._way()
         total, ways = casadi.sum1(self._lasting), (self._reach, after)
         worth = sum(way * (given[3 + i] - 1) / self._speed[i] for i, way in enumerate(ways))
@@ -96,14 +99,15 @@ class ShapeProgram:
         return x[1]
 
     def _beside(self, place: list[casadi.SX], speed: list[casadi.SX], side: int) -> None:
-        """No faster than on the straight of this side, beside it, and near it."""
+        """No faster than on the straight of this side, near it, and on its inside if it must not swing."""
         self._keep(self._size(speed) / self._speed[side] ** 2, -np.inf, 1.0)
         self._keep(place[1 - side] * casadi.sin(self._angle) / TOLERANCE, -1.0, 1.0)
+        self._keep(speed[1 - side] + FARTHEST * self._swings, 0.0, np.inf)
         foot = place[side] + place[1 - side] * casadi.cos(self._angle)
         self._keep((foot if side == 0 else -foot) / TOLERANCE, -np.inf, 0.0)
 
     def solve(self, given: Array, start: Array, *, near: bool) -> tuple[float, Array] | None:
-        """Value, and durations, jerks and reach (19,) from a start, ``near`` or not; None if none was found."""
+        """Value, and durations, jerks and reach (19,), from a start, ``near`` or not; or None."""
         solver = self._solvers[near]
         bounds = {"lbx": self._lower, "ubx": self._upper, "lbg": self._least, "ubg": self._most}
         found = solver(x0=start, p=given, **bounds)
@@ -119,7 +123,7 @@ def guessed(speed: float, rng: np.random.Generator) -> Array:
 
 
 def backwards(shape: Array) -> Array:
-    """(19,) the same shape driven backwards: jerk and directions change their signs, straights their places."""
+    """(19,) the same driven backwards: jerk and directions change their signs, straights their places."""
     rows = shape[:-1].reshape(3, -1)[[0, 2, 1]][:, ::-1]
     return np.append(rows.ravel(), 0.8 * shape[-1])
 
@@ -133,10 +137,10 @@ Pair = tuple[tuple[int, int], tuple[int, int]]
 
 
 class Angle:
-    """All shapes of one angle; each is looked for from a neighbour's, so that what lies between them is one, too."""
+    """All shapes of one angle, each looked for from a neighbour's: so what lies between them is one, too."""
 
-    def __init__(self, degrees: float, beside: "Angle | None" = None) -> None:
-        self._angle, self._program = np.radians(degrees), ShapeProgram()
+    def __init__(self, degrees: float, swings: bool, beside: "Angle | None" = None) -> None:
+        self._angle, self._swings, self._program = np.radians(degrees), swings, ShapeProgram()
         self._rng = np.random.default_rng(int(degrees))
         self._beside = {} if beside is None else beside.found
         self.found: dict[Pair, Array] = {}
@@ -156,7 +160,7 @@ class Angle:
     def _solve(self, pair: Pair) -> None:
         """Look for the shape of a pair of states, and have it backwards, too."""
         (v0, w0), (v1, w1) = one, other = pair
-        given = np.array([self._angle, SPEEDS[v0], SPEEDS[v1], WORTHS[w0], WORTHS[w1]])
+        given = np.array([self._angle, SPEEDS[v0], SPEEDS[v1], WORTHS[w0], WORTHS[w1], self._swings])
         best = None
         for start in self._near(pair):
             best = best or self._program.solve(given, start, near=True)
@@ -185,11 +189,12 @@ class Angle:
                 yield self.found[each]
 
 
-def _chain(angles: tuple[float, ...]) -> list[Array]:
-    """Tables of angles, each from the one before."""
+def _chain(of: tuple[tuple[float, ...], bool]) -> list[Array]:
+    """Tables of angles, each from the one before, of shapes that swing or do not."""
     beside, tables = None, []
+    angles, swings = of
     for degrees in angles:
-        beside = Angle(degrees, beside)
+        beside = Angle(degrees, swings, beside)
         tables.append(beside.table())
         print(f"{degrees}°", file=sys.stderr, flush=True)
     return tables
@@ -210,10 +215,12 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=shapes.TABLE)
     options = parser.parse_args()
     with multiprocessing.Pool(2) as pool:
-        less, more = pool.map(_chain, (ANGLES[RIGHT::-1], ANGLES[RIGHT:]))
+        work = product((False, True), (ANGLES[RIGHT::-1], ANGLES[RIGHT:]))
+        chains = pool.map(_chain, [(angles, swings) for swings, angles in work], chunksize=1)
     # The others are these backwards.
     upper = np.triu_indices(len(STATES))
-    rows = np.stack(less[:0:-1] + more)[:, *upper].astype(np.float16)
+    both = [np.stack(less[:0:-1] + more)[:, *upper] for less, more in (chains[:2], chains[2:])]
+    rows = np.stack(both).astype(np.float16)
     np.savez_compressed(options.out, angle=np.radians(ANGLES), rows=rows)
 
 

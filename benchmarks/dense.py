@@ -7,9 +7,9 @@ curve,
 
     |q'| s' <= F,   |q'' s'² + q' s''| <= A,   |q''' s'³ + 3 q'' s' s'' + q' s'''| <= J.
 
-and the sum of the durations is least. Where |q'| jumps, at the ends of corners with gears, s' and s'' jump the other
-way, so that speed and acceleration are continuous. What comes out is sampled as a motion in time and held to
-the limits by finite differences; time is then stretched by what is missing, so that the
+and the sum of the durations is least. Where |q'| jumps, at the ends of corners with gears, s' and s''
+jump the other way, so that speed and acceleration are continuous. What comes out is sampled as a motion
+in time and held to the limits by finite differences; time is then stretched by what is missing, so that the
 reference is a motion that keeps every limit. Not convex: the result is a local optimum, the best
 of those reached from the plan itself and from the plan slowed down.
 """

@@ -29,6 +29,8 @@ CALM = 0.75
 up to a sixth of the turns between them times h off, and with SPENT that must be less than a third of h."""
 ONWARDS = 0.5
 """Least cosine between a moved segment and its straight."""
+ALONE = 2.0
+"""half-widths to other sharp corners, and the ends, that two must have to become one."""
 LEAST = 2.5
 """half-widths, the shortest straight made."""
 TOUCHING = 1e-9
@@ -105,7 +107,9 @@ def _firm(drawn: _Drawn, h: float) -> int:
     """
     along, pair = drawn.along, 2 * SPENT * h
     sharp, end = drawn.sharp, along[-1]
-    if len(sharp) and sharp[-1] == len(along) - 2 and end - along[sharp[-1]] <= pair:
+    if len(sharp) and end - along[sharp[-1]] <= ALONE * h:
+        both = len(sharp) > 1 and along[sharp[-1]] - along[sharp[-2]] <= pair
+        sharp = sharp[: len(sharp) - both]
         sharp, end = sharp[:-1], along[sharp[-1]]
     place = end - REACH * h - pair
     if len(sharp) and end - along[sharp[-1]] <= 2 * REACH * h + pair:
@@ -118,7 +122,10 @@ def _paired(drawn: _Drawn, feed: Array, h: float, spent: Array) -> Array:
     points, length = drawn.points, np.diff(drawn.along)
     inner = drawn.sharp[(drawn.sharp > 0) & (drawn.sharp < len(length) - 1)]
     pair = inner[(drawn.turn[inner + 1] > SHARP) & (length[inner] <= 2 * SPENT * h)]
-    pair = pair[np.minimum(length[pair - 1], length[pair + 1]) >= 2 * h]
+    sharp = np.concatenate(([0], drawn.sharp, [len(length)]))
+    last, onwards = (drawn.along[sharp[np.searchsorted(sharp, pair) + i]] for i in (-1, 2))
+    alone = np.minimum(drawn.along[pair] - last, onwards - drawn.along[pair + 1]) >= ALONE * h
+    pair = pair[alone]
     before, after = feed[pair] == feed[pair - 1], feed[pair] == feed[pair + 1]
     pair, before = pair[before | after], before[before | after][:, None]
     if not len(pair):

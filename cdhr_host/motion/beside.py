@@ -1,8 +1,8 @@
 """How far the rounding of each corner may reach along the straights beside it.
 
 A corner needs little more than the way from its feed to rest. Where a straight is long enough, both its
-corners have what they need; else they share it, the sharper one getting more. So a corner's room depends
-on no more of the path than twice that. No shape reaches over a change of the feed. A straight
+corners have what they need; else they share it, the sharper one getting somewhat more. So a corner's room
+depends on no more of the path than twice that. No shape reaches over a change of the feed. A straight
 goes on over points that are no corners.
 """
 
@@ -13,14 +13,16 @@ import numpy as np
 
 from cdhr_host.values import Array, Flags, Ints
 
-SWING = 1.3
+SWING = 1.6
 """Ways from the feed to rest that a corner can make use of: it slows down more gently where it swings out."""
 APART = 1 - 1e-6
 """Of each share, so that between two corners there is always a straight."""
-STOP = 1.2
-"""Root of the turn that a stop counts as."""
-GENTLE = 0.1
-"""Root of the least turn that counts."""
+WEIGHT = 0.25
+"""Power of its turn by which a corner shares a straight."""
+STOP = 1.1
+"""What a stop counts as."""
+GENTLE = 0.3
+"""The least that a corner counts as."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,12 +70,13 @@ class Beside:
         """m of the polyline up to which no further drawing changes the path.
 
         The turns of the first ``sure`` corners stay as they are, and up to ``edge`` m the path does not turn
-        any more; the next corner can make use of ``onward`` m before it.
+        any more; the next corner can make use of ``onward`` m before it. A corner that shares a straight with
+        one that is not known is not known either.
         """
-        if sure:
-            last, (before, after) = float(self.at[sure - 1]), self.needed[:, sure - 1]
-            if edge - last < after + onward:
-                return last - max(self.least, float(before))
+        last = sure - 1
+        if sure and edge - self.at[last] < self.needed[1, last] + onward:
+            last -= int(last > 0 and self.shared[0, last])
+            return float(self.at[last] - max(self.least, self.needed[0, last]))
         return edge - max(self.least, onward)
 
 
@@ -100,7 +103,7 @@ def _rooms(between: Array, turn: Array, needed: tuple[Array, Array], least: floa
     ``between`` (K+1,) m are the straights around them, ``needed`` what the corner or stop before each of
     these, and the one after it, can make use of.
     """
-    weight = np.concatenate(([STOP], np.maximum(np.sqrt(turn), GENTLE), [STOP]))
+    weight = np.concatenate(([STOP], np.maximum(turn**WEIGHT, GENTLE), [STOP]))
     (left, right), kept = needed, np.minimum(least, between / 2)
     share = between * weight[:-1] / (weight[:-1] + weight[1:])
     part = np.minimum(np.maximum(share, np.maximum(between - right, kept)), np.minimum(left, between - kept))

@@ -3,7 +3,8 @@
 Whatever a time law does inside the bounds of a cell, the nozzle keeps its limits there. A
 straight cell gives the whole of them to s'' and s'''; a bent one keeps a part for turning.
 At the borders of cells s'' = 0: so they are as long as their bounds are alike. A corner with a shape
-(``motion.swings``) is a cell in which s' stays the same; where it begins and ends |q'| is less than 1, its gears.
+(``motion.swings``) is a cell in which s' stays the same; where it begins and ends |q'| may be less than
+1, its gears.
 """
 
 from dataclasses import dataclass
@@ -105,7 +106,7 @@ class _Stretches:
     @property
     def shaped(self) -> Flags:
         """Whether it is a corner with a shape."""
-        return self.gear[0] > 0.0
+        return np.asarray(self.gear[0] > 0.0, dtype=np.bool_)
 
 
 def cells(
@@ -144,7 +145,11 @@ def cells(
     apart = np.where(np.maximum.reduceat(held_up, heads), np.arange(len(heads)), -1)
     heads = _heads(speed, spent, *rows.gear, _multiples(rows.start + passed, _longest(speed)), apart)
     rows, ways = _merged(rows, heads), ways.least(heads)
-    a, j, gear = ways.share * limits.acceleration, ways.share * limits.jerk, np.where(rows.shaped, rows.gear, 1.0)
+    a, j, gear = (
+        ways.share * limits.acceleration,
+        ways.share * limits.jerk,
+        np.where(rows.shaped, rows.gear, 1.0),
+    )
     return Cells(rows.start, rows.length, ways.speed, a, j, min(span[1], last), rows.long, gear)
 
 

@@ -2,14 +2,11 @@
 
 A corner between directions d0 and d1 is rounded by a kernel (smooth_path), at whose every
 place ds/dt may stay the same. Where that would cost much speed, and both segments leave
-room, the nozzle takes a *shape* instead (``motion.shapes``): a motion that swings out, slows down, turns,
-and speeds up again. At full speed it lasts as long as the limits, the tolerance, the feeds and the room beside
-the corner ask for; ds/dt stays the same all along it, at the greatest speed V on its way. So |q'| <= 1,
-and where it begins and ends |q'| is a part of that: its *gears*. A straight is left at the speed it is passed
-with, and the corner run through at that over the gear. Slower by any factor, the same holds.
-
-Of all shapes that one is taken with which the nozzle is soonest from the middle of one segment in the
-middle of the next: of the table's for the nearest angle first, then of what lies between it and its neighbours.
+room, the nozzle takes a *shape* instead (``motion.shapes``, ``motion.swings``): a motion that swings out,
+slows down, turns, and speeds up again. ds/dt stays the same all along it, at the greatest speed V on its
+way: so |q'| <= 1, and where it begins and ends |q'| is a part of that, its *gears*. At full speed V is as
+great as the limits, the tolerance, the feeds and the room beside the corner allow. Slower by any factor, the
+same holds: the corner is then run through at the speed the straight before it is left with, over the gear.
 """
 
 from dataclasses import dataclass, replace
@@ -68,6 +65,8 @@ class Widths:
     """(2, K) m to both ends of the path; half of it is left for the stop"""
     borders: Array
     """(N,) m of the polyline where points were moved or the feed changes, ascending"""
+    swings: Flags
+    """(K,) whether the nozzle may swing out there: not where that leads below what is drawn"""
 
 
 def turns(around: Beside, turn: Array, widths: Widths) -> Turns:
@@ -89,7 +88,7 @@ def roundings(
     half, chords = widened(single, feed.max(axis=0), widths.usual, allowed)
     share = _beside(allowed.share, corner, 0.0).min(axis=0)
     limits = np.multiply.outer(np.array([allowed.acceleration, allowed.jerk]), share)
-    corners = Corners(single.turn, around.even, feed, limits, widths.own)
+    corners = Corners(single.turn, around.even, feed, limits, widths.own, widths.swings)
     which = _worthwhile(half, corners, ~chords, widths.usual, allowed)
     return _shaped(_kernels(half), which, corners, around.shared) if len(which) else _kernels(half)
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdhr_host.motion.cells import Cells
-from cdhr_host.values import Array, Flags, Ints
+from cdhr_host.values import Array, Flags
 
 FARTHER = 1.25
 """How much shorter cells are taken to be where what follows is not known. Slowing down to v/3 takes 9 % more

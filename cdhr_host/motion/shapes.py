@@ -1,13 +1,14 @@
 """Shapes of corners: ways from one straight to another in six pieces of constant jerk.
 
-Three pieces lead to the corner's middle, three away from it. On each the jerk is b d0 + a d1, with d0 and d1
-the directions before and after the corner. The motion along d0 ends where that along d1 begins from rest: at the
-corner. So with the sums of b t and of a t zero, which ``closed`` sees to, s'' is zero at both ends, and speeds and ways
-along both straights follow. Such a motion slows down and speeds up on its way, and swings out by the tolerance
-before it cuts the corner.
+Three pieces lead to the corner's middle, three away from it. On each the jerk is b d0 + a d1, with d0 and
+d1 the directions before and after the corner. The motion along d0 ends at the corner, where that along d1
+begins from rest. So with the sums of b t and of a t zero, which ``Shapes.of`` sees to, the acceleration is
+zero at both ends, and speeds and ways along both straights follow. Such a motion slows down and speeds up on
+its way, and swings out by the tolerance before it cuts the corner. Where that would lead below what is
+drawn, another kind stays on the inside: along the other straight it never moves backwards.
 
-The table, made by ``benchmarks/corner_shapes.py``, holds the fastest for some angles and some speeds on both
-straights, each where a way along them is worth little and where it is worth much. Units are those in
+The table, made by ``benchmarks/corner_shapes.py``, holds the fastest for some angles and some speeds on
+both straights, each where a way along them is worth much and where it is worth little. Units are those in
 which the greatest jerk is 1. How near a shape keeps to the drawn corner is measured here for the very
 angle it is used at, so a table that is not quite the best costs time, never a limit.
 """
@@ -20,12 +21,14 @@ from pathlib import Path
 
 import numpy as np
 
-from cdhr_host.values import Array, Ints
+from cdhr_host.values import Array, Flags, Ints
 
 TABLE = Path(__file__).with_name("corner_shapes.npz")
 PIECES = 6
 PARTS = 2
 """of each piece, on which it is looked at between its ends"""
+INSIDE = 1e-9
+"""beyond the corner along one of its straights, where that is not allowed: rounding"""
 COARSE = 2
 """Of how many speeds of the table one is tried first"""
 FAR = 1e6
@@ -44,11 +47,13 @@ class Shapes:
 
     @classmethod
     def of(cls, rows: Array) -> "Shapes":
-        """Of rows (..., 18) of durations and jerks, with s'' = 0 at both ends."""
+        """Of rows (..., 18) of durations and jerks, without acceleration at both ends."""
         duration, *jerks = np.split(rows, 3, axis=-1)
-        lasting = duration.sum(axis=-1, keepdims=True)
-        closed = (jerk - (jerk * duration).sum(axis=-1, keepdims=True) / lasting for jerk in jerks)
-        return cls(duration, *closed)
+        # Corrected along the straight that is left or reached, so that the way into the other stays as it is.
+        for jerk, own in zip(jerks, (slice(0, PIECES // 2), slice(PIECES // 2, PIECES)), strict=True):
+            lasting = duration[..., own].sum(axis=-1, keepdims=True)
+            jerk[..., own] -= (jerk * duration).sum(axis=-1, keepdims=True) / lasting
+        return cls(duration, *jerks)
 
     @property
     def first(self) -> "Shapes":
@@ -72,7 +77,7 @@ class Measured:
     acceleration: Array
     """greatest"""
     off: Array
-    """greatest distance from the drawn corner"""
+    """greatest distance from the drawn corner; FAR for what leads nowhere, or out where it must not"""
 
     def at(self, rows: Ints) -> "Measured":
         """Of (N, S) shapes those of rows (K,)."""
@@ -82,8 +87,8 @@ class Measured:
         return Measured(jerk, duration, speed, peak, reach, self.acceleration[rows], self.off[rows])
 
 
-def measured(shapes: Shapes, turn: Array) -> Measured:
-    """Shapes (..., 6) at corners that turn by ``turn`` (rad), of a shape that goes with (...)."""
+def measured(shapes: Shapes, turn: Array, swings: Flags) -> Measured:
+    """Shapes (..., 6) at corners of ``turn`` rad, and whether they may swing out; both go with (...)."""
     cosine, sine = np.cos(turn), np.sin(turn)
     before, after = (np.moveaxis(each, -1, 0) for each in (shapes.before, shapes.after))
     jerk = _length(before, after, cosine).max(axis=0)
@@ -100,6 +105,7 @@ def measured(shapes: Shapes, turn: Array) -> Measured:
     half = PARTS * PIECES // 2
     fast, reach = _length(*speeds, cosine), np.stack((way, last[0, -1]))
     onwards = (speed > 0.0).all(axis=0) & (reach > 0.0).all(axis=0)
+    onwards &= swings | (np.maximum(hull[0].max(axis=(0, 1)), -hull[1].min(axis=(0, 1))) <= INSIDE)
     return Measured(
         jerk,
         total,
@@ -133,9 +139,10 @@ def _parts(duration: Array) -> Array:
 
 
 def _integrated(jerk: Array, duration: Array) -> Array:
-    """(6, ...) -> (3, 6 PARTS + 1, ...): place, speed and acceleration at the ends of parts, from rest at 0."""
+    """(6, ...) -> (3, 6 PARTS + 1, ...): place, speed, acceleration at the ends of parts, from rest at 0."""
     state = np.zeros((3, PARTS * PIECES + 1, *jerk.shape[1:]))
-    for k, (j, t) in enumerate(zip(np.repeat(jerk, PARTS, 0), np.repeat(duration / PARTS, PARTS, 0), strict=True)):
+    parts = (np.repeat(each, PARTS, axis=0) for each in (jerk, duration / PARTS))
+    for k, (j, t) in enumerate(zip(*parts, strict=True)):
         x, v, a = state[:, k]
         state[0, k + 1] = x + t * (v + t * (a / 2 + t * j / 6))
         state[1, k + 1] = v + t * (a + t * j / 2)
@@ -162,12 +169,12 @@ class Table:
     angle: Array
     """(N,) rad"""
     rows: Array
-    """(N, V W, V W, 18) durations and jerks"""
+    """(2, N, V W, V W, 18) durations and jerks of those that stay inside, and of those that swing out"""
 
     @property
     def speeds(self) -> int:
         """V"""
-        return self.rows.shape[1] // WORTHS
+        return int(self.rows.shape[2]) // WORTHS
 
 
 @cache
@@ -175,34 +182,41 @@ def table() -> Table:
     """The shapes that the package comes with."""
     with np.load(TABLE) as held:
         angle, half = held["angle"], held["rows"].astype(np.float64)
-    states = math.isqrt(2 * half.shape[1])
-    rows = np.empty((len(angle), states, states, 3 * PIECES))
+    states, kinds = math.isqrt(2 * half.shape[2]), half.shape[:2]
+    rows = np.empty((*kinds, states, states, 3 * PIECES))
     first, last = np.triu_indices(states)
     # Driven backwards, the jerk and both directions change their signs, and the straights their places.
-    backwards = half.reshape(len(angle), -1, 3, PIECES)[:, :, [0, 2, 1], ::-1]
-    rows[:, last, first] = backwards.reshape(half.shape)
-    rows[:, first, last] = half
+    backwards = half.reshape(*kinds, -1, 3, PIECES)[..., [0, 2, 1], ::-1]
+    rows[:, :, last, first] = backwards.reshape(half.shape)
+    rows[:, :, first, last] = half
+    # What stays inside does so from its first piece to its last, which rounding must not turn around.
+    for piece in (3 * PIECES - PIECES, 2 * PIECES - 1):
+        np.maximum(rows[0, ..., piece], 0.0, out=rows[0, ..., piece])
     return Table(angle, rows)
 
 
-def coarse(angle: Array) -> tuple[tuple[Array, Ints], Measured]:
-    """Some of the table's shapes, for corners of (K,) rad: (2, S) speeds and worths, and (K, S) what they are.
+def coarse(angle: Array, swings: Flags) -> tuple[tuple[Array, Ints], Measured]:
+    """Some of the table's shapes, at the nearest of its angles to each of K corners' (K,) rad.
 
-    Measured at the nearest of the table's angles.
+    Speeds of the table and worths (2, S) on both sides, and what the shapes (K, S) are.
     """
     held = table()
     level = np.arange(0, held.speeds, COARSE)
     state = (WORTHS * level[:, None] + np.arange(WORTHS)).ravel()
     pair = np.stack(np.meshgrid(state, state, indexing="ij")).reshape(2, -1)
-    nearest, row = np.unique(np.abs(angle[:, None] - held.angle).argmin(axis=1), return_inverse=True)
-    shapes = Shapes.of(held.rows[nearest[:, None], pair[0], pair[1]])
-    found = measured(shapes, held.angle[nearest, None])
+    nearest = np.abs(angle[:, None] - held.angle).argmin(axis=1)
+    (out, here), row = np.unique(np.stack((swings.astype(np.intp), nearest)), axis=1, return_inverse=True)
+    shapes = Shapes.of(held.rows[out[:, None], here[:, None], pair[0], pair[1]])
+    found = measured(shapes, held.angle[here, None], out[:, None] > 0)
     return (pair // WORTHS * 1.0, pair % WORTHS), found.at(row)
 
 
-def between(angle: Array, level: Array, worth: Ints) -> Shapes:
-    """(K,) rad, (2, K, S) speeds of the table and worths on both sides -> shapes (K, S, 6) between its own."""
-    held = table()
+def between(angle: Array, swings: Flags, level: Array, worth: Ints) -> Shapes:
+    """Shapes (K, S, 6) between the table's own, at corners of (K,) rad that may swing out or not.
+
+    By (2, K, S) speeds of the table, and worths, on both sides.
+    """
+    held, out = table(), swings.astype(np.intp)[:, None]
     level = np.clip(level, 0.0, held.speeds - 1)
     below = np.minimum(level.astype(np.intp), held.speeds - 2)
     turned = np.clip(np.searchsorted(held.angle, angle) - 1, 0, len(held.angle) - 2)
@@ -212,5 +226,5 @@ def between(angle: Array, level: Array, worth: Ints) -> Shapes:
     for i, j, k in product((0, 1), repeat=3):
         weight = weights[0][i] * weights[1][j] * weights[2][k]
         before, after = WORTHS * (below[0] + j) + worth[0], WORTHS * (below[1] + k) + worth[1]
-        mixed += weight[..., None] * held.rows[(turned + i)[:, None], before, after]
+        mixed += weight[..., None] * held.rows[out, (turned + i)[:, None], before, after]
     return Shapes.of(mixed)

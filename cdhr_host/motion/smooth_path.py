@@ -34,6 +34,8 @@ from cdhr_host.motion.corner import Rounding, Widths, roundings, turns
 from cdhr_host.motion.vectors import norms
 from cdhr_host.values import Array, Flags, Ints
 
+LEVEL = 1e-6
+"""Of a turn, less does not lead up or down."""
 STRAIGHT = 1e-9
 """Direction changes below this (rad) are no corners."""
 
@@ -53,8 +55,8 @@ class SmoothPath:
     bending: Ints
     """(K,) corners whose kernel reaches into the piece; 0 where the path is straight"""
     gear: Array
-    """(2, K) |q'| where the corner begins, and where it ends, that a piece belongs to, if its rounding is a shape
-    (``motion.swings``); 0 elsewhere"""
+    """(2, K) |q'| where the corner begins, and where it ends, that a piece belongs to, if its rounding is a
+    shape (``motion.swings``); 0 elsewhere"""
     steep: Array
     """(K,) greatest |q'|"""
     drawn: Array
@@ -100,6 +102,18 @@ class SmoothPath:
         bent = self.bending > 0
         return np.where(bent, _greatest(rises), 0.0), np.where(bent, _greatest(turns), 0.0)
 
+    def swung(self) -> Array:
+        """(N, 3) m: control points of the pieces of corners that may leave the hull of what is drawn."""
+        out = self.gear[0] > 0.0
+        x, (c0, c1, c2, c3) = self.lengths()[out], self.coefficients[:, :, out]
+        hull = (
+            c0,
+            c0 + c1 * x / 3,
+            c0 + 2 * c1 * x / 3 + c2 * x**2 / 6,
+            c0 + x * (c1 + x * (c2 / 2 + x * c3 / 6)),
+        )
+        return np.concatenate([each.T for each in hull])
+
     def at(self, s: Array) -> tuple[Ints, Array, Array, Array]:
         """(N,) -> piece (N,), q, q', q'' (N, 3) each."""
         piece = np.clip(np.searchsorted(self.start, s, side="right") - 1, 0, len(self.start) - 1)
@@ -140,7 +154,9 @@ def smooth(
     turn = norms(directions[1] - directions[0])
     around = beside(drawn, corner, turn, least=h, allowed=allowed)
     spent = np.zeros(len(points)) if moved is None else moved.spent
-    widths = Widths(h, h - 3.0 * spent[corner], ends, drawn[(spent > 0.0) | _changes(allowed, len(points))])
+    swings = (directions[1] - directions[0])[:, 2] <= LEVEL * turn
+    borders = drawn[(spent > 0.0) | _changes(allowed, len(points))]
+    widths = Widths(h, h - 3.0 * spent[corner], ends, borders, swings)
     single = turns(around, turn, widths)
     rounding = roundings(single, around, corner, widths, allowed)
     saved = np.zeros((2, len(points)))
@@ -299,7 +315,7 @@ def _jumps(turns: tuple[Array, Array], rounding: Rounding, rest: int) -> Array:
 
 
 def _steps(turns: tuple[Array, Array], rounding: Rounding, also: int) -> Array:
-    """(E, 3) 1/m²: by how much q''' changes at begins, middles, ends, between them, and ``also`` elsewhere."""
+    """(E, 3) 1/m²: how much q''' changes at begins, middles, ends, between them, and ``also`` elsewhere."""
     (before, after), inner = turns, rounding.inner
     steps = [old[:, None] * before + new[:, None] * after for old, new in rounding.step]
     old, new = inner.step[:, :, None]

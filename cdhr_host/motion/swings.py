@@ -1,19 +1,23 @@
 """Which shape each corner gets, and how it is run through.
 
 At full speed a shape lasts as long as limits, tolerance, feeds and the room beside the corner
-ask for. Of all shapes that one is taken with which the nozzle is soonest from the middle of one segment in the
-middle of the next: of some of the table's first, then of what lies around and between them. Corners that are
-much alike get the same; how fast it is run through each follows from that corner alone.
+ask for. Of all shapes that one is taken with which the nozzle is soonest from the middle of one segment in
+the middle of the next: of some of the table's first, then of what lies around and between them. Corners
+that are much alike get the same; how fast it is run through each follows from that corner alone.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdhr_host.motion.shapes import FAR, WORTHS, Measured, Shapes, between, coarse, measured
-from cdhr_host.values import Array, Ints
+from cdhr_host.motion.shapes import FAR, WORTHS, Measured, between, coarse, measured
+from cdhr_host.values import Array, Flags, Ints
 
-STEPS = (np.array([0.0, -1.0, 1.0, -2.0, 2.0]), np.array([0.0, -0.33, 0.33, -0.67, 0.67]), np.array([0.0, -0.15, 0.15]))
+STEPS = (
+    np.array([0.0, -1.0, 1.0, -2.0, 2.0]),
+    np.array([0.0, -0.33, 0.33, -0.67, 0.67]),
+    np.array([0.0, -0.15, 0.15]),
+)
 """Speeds of the table that are tried around the best so far, on each side."""
 ALIKE = 0.01, 0.02
 """rad between corners, and parts between rooms beside them, that get the same shape"""
@@ -40,7 +44,9 @@ class Corners:
     limits: Array
     """(2, K) m/s² and m/s³"""
     width: Array
-    """(K,) m, three times the distance by which each may be cut"""
+    """(K,) m, three times the distance by which each may be left"""
+    swings: Flags
+    """(K,) whether the nozzle may swing out"""
 
     @property
     def angle(self) -> Array:
@@ -51,21 +57,21 @@ class Corners:
     def only(self, which: Ints) -> "Corners":
         """Some of them."""
         room, feed, limits = self.room[:, which], self.feed[:, which], self.limits[:, which]
-        return Corners(self.turn[which], room, feed, limits, self.width[which])
+        return Corners(self.turn[which], room, feed, limits, self.width[which], self.swings[which])
 
     def rounded(self) -> "Corners":
         """Without the last digits, in which sums along the path differ with where they begin."""
         turn, room, width = self.turn.round(RADIANS), self.room.round(METRES), self.width.round(METRES)
-        return Corners(turn, room, self.feed, self.limits, width)
+        return Corners(turn, room, self.feed, self.limits, width, self.swings)
 
     def kinds(self) -> tuple["Corners", Ints]:
         """One corner of each kind, and the kind (K,) of each."""
-        turn = np.round(self.angle / ALIKE[0])
-        room = np.round(np.log(self.room) / ALIKE[1])
-        rows = np.vstack((turn, room, self.feed, self.limits, self.width))
-        each, kind = np.unique(rows, axis=1, return_inverse=True)
-        found = Corners(2 * np.sin(ALIKE[0] * each[0] / 2), np.exp(ALIKE[1] * each[1:3]), *np.split(each[3:7], 2), each[7])
-        return found, kind
+        turn, room = np.round(self.angle / ALIKE[0]), np.round(np.log(self.room) / ALIKE[1])
+        rows = np.vstack((turn, room, self.feed, self.limits, self.width, self.swings))
+        _, first, kind = np.unique(rows, axis=1, return_index=True, return_inverse=True)
+        some = self.only(first)
+        chord: Array = 2 * np.sin(ALIKE[0] * turn[first] / 2)
+        return replace(some, turn=chord, room=np.exp(ALIKE[1] * room[:, first])), kind
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,9 +108,9 @@ def swung(corners: Corners) -> Swings:
     """The soonest way through each of K corners."""
     around = corners.rounded()
     kinds, kind = around.kinds()
-    level, worth = (each[:, kind, None] for each in _best(kinds))
-    shapes = between(around.angle, level, worth).first
-    found, jerk = measured(shapes, around.angle), around.limits[1]
+    level, worth = _best(kinds)
+    shapes = between(around.angle, around.swings, level[:, kind, None], worth[:, kind, None]).first
+    found, jerk = measured(shapes, around.angle, around.swings), around.limits[1]
     scale = _scale(found, around)
     lasting = np.where((found.off < FAR)[:, None], shapes.duration * scale[:, None], np.inf)
     return Swings(
@@ -127,7 +133,8 @@ def _scale(found: Measured, around: Corners) -> Array:
         np.sqrt(feed / (j * found.peak)).min(axis=0),
         np.cbrt(room / (j * found.reach)).min(axis=0),
     )
-    return np.minimum.reduce(bounds)
+    scale: Array = np.minimum.reduce(bounds)
+    return scale
 
 
 def _soonest(found: Measured, around: Corners) -> Ints:
@@ -144,31 +151,37 @@ def _soonest(found: Measured, around: Corners) -> Ints:
 
 def _best(around: Corners) -> tuple[Array, Ints]:
     """(2, K) speeds of the table, and (2, K) worths, on both sides of each of K corners."""
-    parts = [around.only(each) for each in np.array_split(np.arange(len(around.turn)), _parts(len(around.turn)))]
-    found = [_best_together(part) for part in parts]
-    level, worth = (np.concatenate(rows, axis=1) for rows in zip(*found, strict=True))
+    count = len(around.turn)
+    level, worth = np.empty((2, count)), np.empty((2, count), dtype=np.intp)
+    for first in range(0, count, TOGETHER):
+        some = np.arange(first, min(first + TOGETHER, count))
+        level[:, some], worth[:, some] = _searched(around.only(some))
     return level, worth
 
 
-def _parts(count: int) -> int:
-    return max(-(-count // TOGETHER), 1)
-
-
-def _best_together(around: Corners) -> tuple[Array, Ints]:
+def _searched(around: Corners) -> tuple[Array, Ints]:
     """The same of few enough corners for the memory."""
-    (levels, worths), found = coarse(around.angle)
+    (level, worth), found = coarse(around.angle, around.swings)
     best = _soonest(found, around)
-    level, worth, row = levels[:, best], worths[:, best], np.arange(len(best))
-    other = _pairs(np.arange(WORTHS)).astype(np.intp)
+    level, worth, worths = (
+        level[:, best],
+        worth[:, best],
+        _pairs(np.arange(WORTHS, dtype=np.float64)).astype(np.intp),
+    )
     for step in STEPS:
-        tried = level[:, :, None] + _pairs(step), np.broadcast_to(worth[:, :, None], (2, len(row), len(step) ** 2))
-        best = _soonest(measured(between(around.angle, *tried), around.angle[:, None]), around)
-        level = tried[0][:, row, best]
-        flat = np.broadcast_to(level[:, :, None], (2, len(row), other.shape[2]))
-        both = np.broadcast_to(other, flat.shape)
-        best = _soonest(measured(between(around.angle, flat, both), around.angle[:, None]), around)
-        worth = both[:, row, best]
+        level, worth = _chosen(around, level[:, :, None] + _pairs(step), worth[:, :, None])
+        level, worth = _chosen(around, level[:, :, None], worths)
     return level, worth
+
+
+def _chosen(around: Corners, level: Array, worth: Ints) -> tuple[Array, Ints]:
+    """(2, K) of S speeds and worths (2, K, S) the best."""
+    shape = np.broadcast_shapes(level.shape, worth.shape)
+    level, worth = np.broadcast_to(level, shape), np.broadcast_to(worth, shape)
+    shapes = between(around.angle, around.swings, level, worth)
+    best = _soonest(measured(shapes, around.angle[:, None], around.swings[:, None]), around)
+    row = np.arange(len(best))
+    return level[:, row, best], worth[:, row, best]
 
 
 def _pairs(values: Array) -> Array:

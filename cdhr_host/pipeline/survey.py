@@ -5,8 +5,8 @@ enough to find its extremes; where they do not, every tick is looked at:
 
 * speed, acceleration, jerk and flow of the nozzle: bounds in continuous time (motion.bounds);
   the sliders' follow, as in ``MotionLimits.from_profile``;
-* the bed: a cylinder is convex and the smoothed path a weighted mean of drawn points, so a
-  leg whose drawn points are all inside stays inside;
+* the bed: a cylinder is convex and the smoothed path a weighted mean of drawn points, but for corners that
+  swing out, which stay between the control points of their pieces: a leg stays inside if all of these are;
 * slider travel: a cable's length changes by at most the way of the nozzle;
 * cable forces: f = f0(q) + B(q) a with |a| bounded over the leg, and f0 changes by at most
   ``force_slope`` for each metre; no place is further than half of SPACING from a sample.
@@ -84,6 +84,7 @@ class Survey:
             and found.jerk <= limits.jerk_max * slack
             and max(pressure, found.air) <= extruder.pressure_max * slack
             and bool(on_bed(leg.segments.points, self._profile).all())
+            and bool(on_bed(leg.path.swung(), self._profile).all())
         )
 
     def _certain(self, track: ToolTrack, found: LegBounds) -> Flags:

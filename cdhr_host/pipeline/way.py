@@ -69,7 +69,7 @@ class Way:
 def places(leg: Leg, turns: Turns) -> Array:
     """(M,) m: places so near to each other that the cubics between them are good.
 
-    Where q' jumps, at the ends of corners with gears, there are two, so that each cubic has the slope on its side.
+    Where q' jumps, at the ends of corners with gears, there are two: each cubic has the slope on its side.
     """
     start, (first, last) = leg.path.start, (leg.law.within[0, 0], leg.law.within[1, -1])
     inside = slice(

@@ -17,7 +17,7 @@ from cdhr_host.pipeline.rig import Rig
 PAPER = open_profile("paper")
 RIG = Rig.from_profile(PAPER)
 RATE = 1000.0
-NEAR = b"G1 X170 Z100 F6000\nG1 X180\nG1 Y15\nG1 X170\nG1 Y-15\nG1 X180\n"
+NEAR = b"G1 X170 Z100 F6000\nG1 X184\nG1 Y15\nG1 X170\nG1 Y-15\nG1 X184\n"
 """corners and ends where some 0.2 m/s² are left of 0.5"""
 OUTSIDE = b"G1 X170 Z100 F6000\nG1 X230\n"
 
