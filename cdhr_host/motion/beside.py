@@ -1,8 +1,8 @@
 """How far the rounding of each corner may reach along the straights beside it.
 
 A corner needs little more than the way from its feed to rest. Where a straight is long enough, both its
-corners have what they need; else they share it, the sharper one getting somewhat more. So a corner's room
-depends on no more of the path than twice that. No shape reaches over a change of the feed. A straight
+corners have what they need; else they share it evenly. So a corner's room depends on no more of the path
+than twice that. No shape reaches over a change of the feed. A straight
 goes on over points that are no corners.
 """
 
@@ -17,12 +17,6 @@ SWING = 1.6
 """Ways from the feed to rest that a corner can make use of: it slows down more gently where it swings out."""
 APART = 1 - 1e-6
 """Of each share, so that between two corners there is always a straight."""
-WEIGHT = 0.25
-"""Power of its turn by which a corner shares a straight."""
-STOP = 1.1
-"""What a stop counts as."""
-GENTLE = 0.3
-"""The least that a corner counts as."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,11 +74,8 @@ class Beside:
         return edge - max(self.least, onward)
 
 
-def beside(drawn: Array, corner: Ints, turn: Array, *, least: float, allowed: Allowance | None) -> Beside:
-    """Of the corners at points ``corner`` (K,) of a polyline, whose changes of direction are ``turn`` (K,).
-
-    ``drawn`` (M+1,) m is how far along each point is.
-    """
+def beside(drawn: Array, corner: Ints, *, least: float, allowed: Allowance | None) -> Beside:
+    """Of the corners at points ``corner`` (K,) of a polyline; ``drawn`` (M+1,) m is how far along each is."""
     at, count = drawn[corner], len(drawn) - 1
     ways = np.full(count, math.inf) if allowed is None else np.maximum(allowed.ways(), 2 * least)
     changes = np.zeros(count - 1, dtype=np.bool_) if allowed is None else allowed.changes()
@@ -92,21 +83,20 @@ def beside(drawn: Array, corner: Ints, turn: Array, *, least: float, allowed: Al
     needed = np.minimum(np.stack((ways[corner - 1], ways[corner])), np.maximum(even, 2 * least))
     between = np.diff(at, prepend=drawn[0], append=drawn[-1])
     both = np.concatenate((ways[:1], needed[1])), np.concatenate((needed[0], ways[-1:]))
-    room, short = _rooms(between, turn, both, least), between < both[0] + both[1]
+    room, short = _rooms(between, both, least), between < both[0] + both[1]
     shared = np.stack((short[:-1], short[1:]))
     return Beside(at, needed, room, np.minimum(room, even), shared, ways, least)
 
 
-def _rooms(between: Array, turn: Array, needed: tuple[Array, Array], least: float) -> Array:
+def _rooms(between: Array, needed: tuple[Array, Array], least: float) -> Array:
     """(2, K) m before and after each corner.
 
     ``between`` (K+1,) m are the straights around them, ``needed`` what the corner or stop before each of
     these, and the one after it, can make use of.
     """
-    weight = np.concatenate(([STOP], np.maximum(turn**WEIGHT, GENTLE), [STOP]))
     (left, right), kept = needed, np.minimum(least, between / 2)
-    share = between * weight[:-1] / (weight[:-1] + weight[1:])
-    part = np.minimum(np.maximum(share, np.maximum(between - right, kept)), np.minimum(left, between - kept))
+    half = np.maximum(between / 2, np.maximum(between - right, kept))
+    part = np.minimum(half, np.minimum(left, between - kept))
     ample = between >= left + right
     after, before = np.where(ample, left, part), np.where(ample, right, between - part)
     return np.asarray(APART * np.stack((before[:-1], after[1:])), dtype=np.float64)

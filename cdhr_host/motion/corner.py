@@ -147,7 +147,8 @@ def _met(speed: Array, which: Ints, shared: Flags) -> Array:
     """
     met = np.full(speed.shape, np.inf)
     pair = np.flatnonzero((np.diff(which) == 1) & shared[1, :-1])
-    met[1, pair], met[0, pair + 1] = speed[0, pair + 1], speed[1, pair]
+    slower = np.minimum(speed[1, pair], speed[0, pair + 1])
+    met[1, pair], met[0, pair + 1] = slower, slower
     return met
 
 
