@@ -44,8 +44,9 @@ def grid(run: Run, steps: int = STEPS) -> Grid:
     lengths = np.diff(run.s)
     s = np.append(run.s[piece] + lengths[piece] * part / count[piece], run.s[-1])
     middle = (s[1:] + s[:-1]) / 2
-    rate, between = _norm(run.at(s)[1]), _norm(run.at(middle)[1])
-    arc = np.diff(s) * (rate[1:] + 4 * between + rate[:-1]) / 6
+    first, between = (_norm(run.at(each)[1]) for each in (s[:-1], middle))
+    last = _norm(run.at(s[1:], before=True)[1])
+    arc = np.diff(s) * (first + 4 * between + last) / 6
     curvature = _curvature(run, s)
     bend = np.where(run.bent[piece], np.minimum(curvature[1:], curvature[:-1]), 0.0)
     return Grid(s, arc, curvature, bend, run.feed[piece])

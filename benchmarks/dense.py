@@ -94,8 +94,7 @@ def _solved(run: Run, limits: MotionLimits, s: Array, slower: float) -> Referenc
     x = np.array(answer["x"]).ravel()
     rate, change, jerk = x[:n] * limits.speed, x[n : 2 * n] * limits.acceleration, x[2 * n : 3 * n - 1]
     step = x[3 * n - 1 :] * UNIT_TIME
-    motion = rate[0], change[0], jerk * limits.jerk, _ratios(run, s)
-    stretched = _excess(run, limits, motion, step)
+    stretched = _excess(run, limits, (s, rate, change, jerk * limits.jerk), step)
     t = stretched * np.concatenate(([0.0], np.cumsum(step)))
     return Reference(float(t[-1]), stretched, s, t, bool(solver.stats()["success"]))
 
@@ -125,7 +124,8 @@ def _guess(run: Run, limits: MotionLimits, s: Array, slower: float) -> Array:
     t = np.arange(0.0, run.planned, SAMPLE_S / 4)
     where, rate, change = run.plan_at(t)
     when = np.interp(s, np.maximum.accumulate(where), t)
-    rate, change = np.interp(when, t, rate) / slower, np.interp(when + SAMPLE_S / 4, t, change) / slower**2
+    after = when + SAMPLE_S / 4
+    rate, change = np.interp(after, t, rate) / slower, np.interp(after, t, change) / slower**2
     step = np.maximum(np.diff(when), 1e-5) * slower
     arriving = (change * _ratios(run, s))[1:]
     jerk = np.clip((arriving - change[:-1]) / step / limits.jerk, -1.0, 1.0)
@@ -220,20 +220,18 @@ def _squared(vectors: list[Array], factors: list[Any]) -> Any:
     return total
 
 
-def _driven(start: tuple[float, float, Array, Array], step: Array) -> Array:
-    """(N,) m: s every SAMPLE_S, from s' and s'' at the start, each step's jerk, and ratios at the nodes."""
-    v, a, j, ratio = start
+def _driven(motion: tuple[Array, Array, Array, Array], step: Array) -> Array:
+    """(N,) m: s every SAMPLE_S, from s, s' and s'' after each node and each step's jerk.
+
+    Where |q'| jumps a step must not reach beyond its nodes, not even by rounding.
+    """
+    nodes, rate, change, jerk = motion
     begin = _running(0.0, step)
-    # In units of the rate at the start, no ratio comes between.
-    unit = np.cumprod(ratio)[:-1] / ratio[0]
-    change = _running(a, j * step * unit)[:-1]
-    rate = _running(v, step * (change + step * j * unit / 2))[:-1]
-    change, rate = change / unit, rate / unit
-    s = _running(0.0, step * (rate + step * (change / 2 + step * j / 6)))[:-1]
     t = np.arange(0.0, begin[-1], SAMPLE_S)
     k = np.clip(np.searchsorted(begin, t, side="right") - 1, 0, len(step) - 1)
     x = t - begin[k]
-    return s[k] + x * (rate[k] + x * (change[k] / 2 + x * (j[k] / 6)))
+    s = nodes[k] + x * (rate[k] + x * (change[k] / 2 + x * (jerk[k] / 6)))
+    return np.clip(s, nodes[k], nodes[k + 1])
 
 
 def _running(start: float, increments: Array) -> Array:
@@ -241,9 +239,9 @@ def _running(start: float, increments: Array) -> Array:
     return np.cumsum(np.concatenate(([start], increments)))
 
 
-def _excess(run: Run, limits: MotionLimits, start: tuple[float, float, Array, Array], step: Array) -> float:
+def _excess(run: Run, limits: MotionLimits, motion: tuple[Array, Array, Array, Array], step: Array) -> float:
     """By how much time must be stretched for finite differences of the motion to keep the limits."""
-    s = _driven(start, step)
+    s = _driven(motion, step)
     position = run.at(s)[0]
     feed = run.feed[np.clip(np.searchsorted(run.s, s[:-1], side="right") - 1, 0, len(run.feed) - 1)]
     feed = np.maximum(feed, np.append(feed[1:], feed[-1]))

@@ -19,7 +19,9 @@ from cdhr_host.motion.swings import Corners, Swings, swung, time_around
 from cdhr_host.values import Array, Flags, Ints
 
 ALONE = 0.999
-"""Of the usual half-width, the least room on both sides of a corner that stands alone."""
+"""Of the usual half-width, the least room on both sides of a corner that stands alone,"""
+WIDEST = 0.75
+"""and of that room its widest kernel; the rest is left for changing speed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +76,8 @@ def turns(around: Beside, turn: Array, widths: Widths) -> Turns:
     reach = around.room.min(axis=0)
     alone = reach >= ALONE * widths.usual
     shared = np.minimum(widths.usual, widths.ends.min(axis=0) / 2)
-    half = np.where(alone, np.minimum(reach, 2 * widths.own / turn), shared)
+    single = np.minimum(np.maximum(WIDEST * reach, np.minimum(reach, widths.usual)), 2 * widths.own / turn)
+    half = np.where(alone, single, shared)
     return Turns(around.at, turn, half, alone, around.room, widths.ends, widths.borders)
 
 
