@@ -28,14 +28,15 @@ def test_the_plant_rings_after_a_corner_in_both_sideways_modes(unshaped):
         assert strength(swing, mode) > 10 * outside
 
 
-@pytest.mark.parametrize(("kind", "frequency", "left"), [("mzv", 15.0, 0.1), ("ei", 16.0, 0.05)])
-def test_shapers_that_reach_both_modes_leave_less_than_a_tenth(kind, frequency, left, unshaped):
+@pytest.mark.parametrize(
+    ("kind", "frequency", "left"), [("zv", 18.0, 0.1), ("mzv", 18.0, 0.1), ("ei", 16.0, 0.05)]
+)
+def test_every_shaper_leaves_less_than_a_tenth(kind, frequency, left, unshaped):
     assert vibration(shaper(kind, frequency, DAMPING)) < left * unshaped
 
 
 @pytest.mark.parametrize("mode", [14.3, 18.1])
-def test_the_shortest_shaper_takes_the_one_mode_it_is_made_for(mode, unshaped):
-    assert vibration(shaper("zv", mode, DAMPING)) < 0.3 * unshaped
+def test_the_shortest_shaper_takes_the_one_mode_it_is_made_for(mode):
     before, after = (ringing(*corner(shaped)) for shaped in (UNSHAPED, shaper("zv", mode, DAMPING)))
     assert strength(after, mode) < 0.1 * strength(before, mode)
 
