@@ -48,7 +48,7 @@ class Shapes:
     @classmethod
     def of(cls, rows: Array) -> "Shapes":
         """Of rows (..., 18) of durations and jerks, without acceleration at both ends."""
-        duration, *jerks = np.split(rows, 3, axis=-1)
+        duration, *jerks = np.split(rows.copy(), 3, axis=-1)
         # Corrected along the straight that is left or reached, so that the way into the other stays as it is.
         for jerk, own in zip(jerks, (slice(0, PIECES // 2), slice(PIECES // 2, PIECES)), strict=True):
             lasting = duration[..., own].sum(axis=-1, keepdims=True)
@@ -190,7 +190,7 @@ def table() -> Table:
     rows[:, :, last, first] = backwards.reshape(half.shape)
     rows[:, :, first, last] = half
     # What stays inside does so from its first piece to its last, which rounding must not turn around.
-    for piece in (3 * PIECES - PIECES, 2 * PIECES - 1):
+    for piece in (2 * PIECES - 1, 2 * PIECES):
         np.maximum(rows[0, ..., piece], 0.0, out=rows[0, ..., piece])
     return Table(angle, rows)
 

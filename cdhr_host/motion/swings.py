@@ -161,13 +161,10 @@ def _best(around: Corners) -> tuple[Array, Ints]:
 
 def _searched(around: Corners) -> tuple[Array, Ints]:
     """The same of few enough corners for the memory."""
-    (level, worth), found = coarse(around.angle, around.swings)
+    tried, found = coarse(around.angle, around.swings)
     best = _soonest(found, around)
-    level, worth, worths = (
-        level[:, best],
-        worth[:, best],
-        _pairs(np.arange(WORTHS, dtype=np.float64)).astype(np.intp),
-    )
+    level, worth = tried[0][:, best], tried[1][:, best]
+    worths = _pairs(np.arange(WORTHS, dtype=np.float64)).astype(np.intp)
     for step in STEPS:
         level, worth = _chosen(around, level[:, :, None] + _pairs(step), worth[:, :, None])
         level, worth = _chosen(around, level[:, :, None], worths)
