@@ -212,7 +212,7 @@ def _filled(found: Array) -> Array:
 def main() -> None:
     """Write the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--out", type=Path, default=shapes.TABLE)
+    parser.add_argument("--out", type=Path, default=Path(str(shapes.TABLE)))
     options = parser.parse_args()
     with multiprocessing.Pool(2) as pool:
         work = product((False, True), (ANGLES[RIGHT::-1], ANGLES[RIGHT:]))

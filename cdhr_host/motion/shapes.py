@@ -16,14 +16,15 @@ angle it is used at, so a table that is not quite the best costs time, never a l
 import math
 from dataclasses import dataclass
 from functools import cache
+from importlib.resources import files
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 
 from cdhr_host.values import Array, Flags, Ints
 
-TABLE = Path(__file__).with_name("corner_shapes.npz")
+TABLE = files(__package__) / "corner_shapes.npz"
+"""comes with the package, as its code does"""
 PIECES = 6
 PARTS = 2
 """of each piece, on which it is looked at between its ends"""
@@ -180,7 +181,7 @@ class Table:
 @cache
 def table() -> Table:
     """The shapes that the package comes with."""
-    with np.load(TABLE) as held:
+    with TABLE.open("rb") as content, np.load(content) as held:
         angle, half = held["angle"], held["rows"].astype(np.float64)
     states, kinds = math.isqrt(2 * half.shape[2]), half.shape[:2]
     rows = np.empty((*kinds, states, states, 3 * PIECES))

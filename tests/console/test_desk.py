@@ -118,7 +118,7 @@ async def test_a_print_is_held_resumed_and_done(hand: Hands) -> None:
     await hand.print(RING)
     await hand.press("space")
     await hand.until(lambda: hand.printer.state is JobState.HELD)
-    assert "space resumes" in hand.text("job")
+    await hand.until(lambda: "space resumes" in hand.text("job"))
     await hand.press("left_square_bracket", "left_curly_bracket")
     await hand.until(lambda: "feed  90%  flow  90%" in hand.text("air"))
     await hand.press("0", "space")

@@ -78,8 +78,7 @@ class Trail:
         t = track.tick * self._period(checked)
         quantities = norms(track.velocity), margin, pressure, track.flow, t, track.line, *track.velocity.T
         rows = np.column_stack([track.position_G, *quantities])
-        if self._last is not None:
-            rows = np.concatenate([self._last[None], rows])
+        rows = np.concatenate([rows[:1] if self._last is None else self._last[None], rows])
         self._last = rows[-1]
         return _between(rows)
 
