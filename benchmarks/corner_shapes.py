@@ -1,6 +1,7 @@
 """The shapes of corners that the planner chooses from: the fastest ways around a corner, found once.
 
-    python benchmarks/corner_shapes.py [--out FILE]       (needs the extra: pip install -e .[bench])
+    python benchmarks/corner_shapes.py              some of the table's shapes, looked for again
+    python benchmarks/corner_shapes.py --out FILE   the whole table (both need pip install -e .[bench])
 
 Six pieces of constant jerk, three before the corner's middle and three after it, lead from a straight
 passed at one speed to one passed at another. Each shape is the solution of a nonlinear program: least time
@@ -13,7 +14,7 @@ import argparse
 import multiprocessing
 import sys
 from collections.abc import Iterator
-from itertools import product
+from itertools import islice, product
 from pathlib import Path
 
 import casadi
@@ -38,6 +39,13 @@ SAMPLES = 8
 """of each piece, at which limits are kept"""
 STARTS = 3
 """guesses from which one is looked for where no neighbour is known"""
+SOME_ANGLES = (45.0, 90.0, 135.0)
+SOME_PAIRS = (((9, 0), (9, 0)), ((11, 1), (6, 0)), ((12, 1), (12, 1)), ((13, 0), (8, 1)))
+"""angles and states of both sides that are looked for again"""
+SMOKE = 4
+"""of them in a short run"""
+SAME = 0.06
+"""by which worths may differ, for optima are local, and in half precision: 6 ms with 500 mm/s² and 5000 mm/s³"""
 LONGEST, HARDEST, FARTHEST = 8.0, 60.0, 80.0
 """bounds of what is looked for"""
 
@@ -209,11 +217,40 @@ def _filled(found: Array) -> Array:
     return found
 
 
+def again() -> Iterator[tuple[bool, float, Pair, float, float]]:
+    """Of some shapes, what they are, and their worth in the table and looked for again from there."""
+    program = ShapeProgram()
+    for swings, degrees, pair in product((False, True), SOME_ANGLES, SOME_PAIRS):
+        i, j = (STATES.index(state) for state in pair)
+        held = shapes.table().rows[int(swings), ANGLES.index(degrees), i, j]
+        (v0, w0), (v1, w1) = pair
+        given = np.array([np.radians(degrees), SPEEDS[v0], SPEEDS[v1], WORTHS[w0], WORTHS[w1], swings])
+        shape = shapes.measured(shapes.Shapes.of(held), given[0], np.bool_(True))
+        found = program.solve(given, np.append(held, shape.reach[0]), near=True)
+        worth = float(shape.duration + (shape.reach * (given[3:5] - 1) / given[1:3]).sum())
+        yield swings, degrees, pair, worth, np.inf if found is None else found[0] / 10
+
+
 def main() -> None:
-    """Write the table."""
+    """Write the table, or compare some of it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--out", type=Path, default=Path(str(shapes.TABLE)))
+    parser.add_argument("--out", type=Path, help="write the whole table here, 20 minutes on two processors")
+    parser.add_argument("--smoke", action="store_true", help="a few shapes")
     options = parser.parse_args()
+    if options.out is not None:
+        write(options.out)
+        return
+    worst = 0.0
+    print("| swings out | angle | states | worth in the table | found again |\n|---|---|---|---|---|")
+    for swings, degrees, pair, held, found in islice(again(), SMOKE if options.smoke else None):
+        print(f"| {swings} | {degrees:g}° | {pair} | {held:.4f} | {found:.4f} |", flush=True)
+        worst = max(worst, abs(found - held))
+    if worst > SAME:
+        raise SystemExit(f"what was found differs by {worst:.3f}")
+
+
+def write(out: Path) -> None:
+    """Look for all shapes, and write the table."""
     with multiprocessing.Pool(2) as pool:
         work = product((False, True), (ANGLES[RIGHT::-1], ANGLES[RIGHT:]))
         chains = pool.map(_chain, [(angles, swings) for swings, angles in work], chunksize=1)
@@ -221,7 +258,7 @@ def main() -> None:
     upper = np.triu_indices(len(STATES))
     both = [np.stack(less[:0:-1] + more)[:, *upper] for less, more in (chains[:2], chains[2:])]
     rows = np.stack(both).astype(np.float16)
-    np.savez_compressed(options.out, angle=np.radians(ANGLES), rows=rows)
+    np.savez_compressed(out, angle=np.radians(ANGLES), rows=rows)
 
 
 if __name__ == "__main__":

@@ -25,8 +25,8 @@ HELPERS = {
     "hosts",
     "far_side",
 }
-BY_HAND = {"chaos_drives", "corner_shapes"}
-"""take long by themselves; their cases are tests (tests/drives/test_processes.py, test_corner_shapes.py)"""
+BY_HAND = {"chaos_drives"}
+"""needs an idle machine and an hour; its cases are tests (tests/drives/test_processes.py)"""
 
 
 REAL_TIME = {"drives", "serve", "slicer_print", "soak", "start"}
