@@ -45,7 +45,7 @@ SOME_PAIRS = (((9, 0), (9, 0)), ((11, 1), (6, 0)), ((12, 1), (12, 1)), ((13, 0),
 SMOKE = 4
 """of them in a short run"""
 SAME = 0.06
-"""by which worths may differ, for optima are local, and in half precision: 6 ms with 500 mm/s² and 5000 mm/s³"""
+"""by which worths may differ (optima are local, the table in half precision): 6 ms at 500 and 5000 mm/s³"""
 LONGEST, HARDEST, FARTHEST = 8.0, 60.0, 80.0
 """bounds of what is looked for"""
 
