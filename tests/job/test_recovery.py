@@ -134,7 +134,6 @@ def checked(machine: Machine, whole: Setpoints, recovery: Recovery) -> None:
     asked = float(whole.flow.sum()) * period
     per_metre = asked / program_length(whole)
     assert volume - asked < (recovery.overlap + 1.0 * MM) * per_metre
-    # Each end of a bead is passed within a tick, at 100 mm/s within 0.4 mm.
     assert volume - asked > -1.0 * MM * per_metre
 
 
