@@ -22,7 +22,7 @@ from cdhr_host.motion.playback import Pace, Start, landing, ramp
 from cdhr_host.motion.ramps import choices
 from cdhr_host.pipeline.course import Course
 from cdhr_host.pipeline.score import Part
-from cdhr_host.pipeline.spots import Spot, beyond, spot, when
+from cdhr_host.pipeline.spots import spot, when
 
 LATER: Final = (0, 2, 5, 10, 18, 28, 40)
 """ticks after the first that may be changed at which a join is tried"""
@@ -113,7 +113,7 @@ class Feeds:
         now = part.pace.start(float(begin))
         other = self._other(part.course, now.u)
         here = spot(part.course, now.u)
-        if other is None or here is None or (u := self._when(other, here)) is None:
+        if other is None or here is None or (u := when(other, here)) is None:
             return
         other.drop(int(u) - KEPT)
         feeder.making.score = score.with_part(Part(begin, other, Pace.of(tick=begin, u=u, rate=0.0)))
@@ -179,7 +179,7 @@ class Feeds:
         """Where the other course is joined, and at which rate; None where it is slower or not known."""
         now = part.pace.start(float(tick))
         here = spot(part.course, now.u)
-        if here is None or (u := self._when(other, here)) is None:
+        if here is None or (u := when(other, here)) is None:
             return None
         there = spot(other, u)
         if there is None or there.moves != here.moves or there.number != here.number:
@@ -194,17 +194,9 @@ class Feeds:
         slope = (acceleration - rate**2 * there.acceleration) / there.speed * period
         return Start(tick, u, min(rate, 1.0), slope)
 
-    def _when(self, course: Course, place: Spot) -> float | None:
-        """When a course is at a place; it is planned on as far as needed."""
-        while (found := when(course, place)) is None and not course.over:
-            if beyond(course, place):
-                return None
-            course.plan(course.staircase.tick)
-        return found
-
     def _on_base(self, course: Course, u: float) -> float | None:
         here = spot(course, u)
-        return None if here is None or self.base is None else self._when(self.base, here)
+        return None if here is None or self.base is None else when(self.base, here)
 
     def _follow(self, base: Course) -> None:
         """Let go of what the base has behind the machine."""

@@ -43,7 +43,9 @@ class Plan:
     executed: float
     fed: float
     pace: float = 0.0
-    """ticks of it in one of the drives', at most until then; 0 where it does not change"""
+    """feed override at most until then; 0 where the plan at 100 % is played as slowly as lately"""
+    steady: bool = False
+    """whether the machine has got to that override"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +126,7 @@ class Recorder:
     def expect(self, line: int, plan: Plan) -> None:
         """How far the drives may get, and how fast: to be written before they are fed that."""
         if self._journal is not None:
-            self._journal.add(Fed(line, round(plan.fed, 6), plan.pace))
+            self._journal.add(Fed(line, round(plan.fed, 6), plan.pace, plan.steady))
 
     def look(self, now: float, fed: int, *, waiting: bool) -> Alarm | None:
         """Clocks, feeder and disk, about once a second; the first thing wrong."""

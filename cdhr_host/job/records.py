@@ -83,7 +83,8 @@ class Records:
             return None
         held = player.link.free + player.feeder.buffered
         steady = player.feeder.settled and player.feeds.right
-        return Plan(now, now + held * max(player.feed, 1.0), 0.0 if steady else player.feed)
+        pace = 0.0 if steady and player.feed <= 1.0 else player.feed
+        return Plan(now, now + held * max(player.feed, 1.0), pace, steady and player.gain <= 1.0)
 
     def _heard(self, event: Event) -> None:
         assert self._recorder is not None

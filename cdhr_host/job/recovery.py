@@ -8,8 +8,7 @@ which such a stop ends where the nozzle stands.
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -18,8 +17,9 @@ from cdhr_host.errors import JobError, Problem
 from cdhr_host.job.aside import Aside
 from cdhr_host.job.journal import SYNC_EVERY, Executed, Journal, boot_name
 from cdhr_host.job.making import Making
+from cdhr_host.job.own_stop import Ahead, Stops, ahead, planned_to
 from cdhr_host.job.program import Program
-from cdhr_host.motion.hold import rows_needed
+from cdhr_host.motion.hold import longest_wait, rows_needed
 from cdhr_host.motion.leg import Leg
 from cdhr_host.motion.playback import Pace
 from cdhr_host.motion.sampling import Timed
@@ -29,7 +29,7 @@ from cdhr_host.pipeline.rig import Rig
 from cdhr_host.pipeline.score import Gain, Part, Score
 from cdhr_host.pipeline.tape import Tape
 from cdhr_host.units import MM
-from cdhr_host.values import Array, Setpoints
+from cdhr_host.values import Array
 
 SAME: Final = 0.02 * MM
 """how far the journal's nozzle may be from the plan's"""
@@ -41,8 +41,6 @@ BEGUN: Final = 2.0
 """ticks by which a link's own stop may have begun later than is found: both its ends are rounded to rows"""
 BACK: Final = 60.0
 """s of plan looked back over for the overlap"""
-Stops = Callable[[Setpoints], Setpoints]
-"""rows ahead -> the rows a link plays instead when it comes to rest by itself"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,7 +180,7 @@ class Resuming:
         """Ticks at which the bead ended and the nozzle rests, m from the path, and whether that is sure."""
         last, fed = known
         reach = fed + rows_needed(self._rig.profile) * max(journal.pace_most, 1.0)
-        end = max(float(self._end(course, reach)), last.plan_tick)
+        end = max(float(planned_to(course, reach)), last.plan_tick)
         tick = np.append(np.arange(last.plan_tick, end, FINE), end)
         away = np.linalg.norm(course.nozzle(tick).position_G - measured_G, axis=1)
         limit = self._astray(course, journal, (last.plan_tick, reach), stops)
@@ -195,13 +193,13 @@ class Resuming:
         first, latest = _rested(away, max(NEAR, float(away.min())))
         if journal.state == "held" and tick[first] - last.plan_tick < 1.0:
             return last.plan_tick, last.plan_tick, float(away[first]), True
-        begins = [
-            self._stop_begin(course, (last.plan_tick, reach), float(tick[first]), pace, stops)
-            for pace in sorted({journal.pace, journal.pace_most})
-        ]  # any other stop is shorter, and so is one from less speed: clay ended there or later
+        played = self._played(course, journal, (last.plan_tick, reach))
+        begins = [each.stop_begin(float(tick[first]), stops) for each in played]
         bead = min(last.plan_tick if begin is None else begin for begin in begins)
+        if journal.changing:
+            bead -= longest_wait(self._rig.profile) / self._period * journal.pace_most
         as_links_do = journal.state != "fault" and not _cut(journal)
-        sure = begins[0] is not None and len(begins) == 1 and first == latest and as_links_do
+        sure = begins[0] is not None and not journal.changing and first == latest and as_links_do
         return max(bead, last.plan_tick), float(tick[latest]), float(away[first]), sure
 
     def _astray(self, course: Course, journal: Journal, known: tuple[float, float], stops: Stops) -> float:
@@ -212,29 +210,16 @@ class Resuming:
         """
         if journal.state != "fault" and not _cut(journal):
             return NEAR
-        _, rows = self._played(course, known, max(journal.pace_most, 1.0))
-        steps = np.diff(stops(rows).nozzle_G, axis=0)
-        return NEAR + float(np.linalg.norm(steps, axis=1).sum())
+        return NEAR + max(each.stop_way(stops) for each in self._played(course, journal, known))
 
-    def _played(self, course: Course, reach: tuple[float, float], pace: float) -> tuple[Array, Setpoints]:
-        """Ticks of the plan between two, as a pace plays them, and the rows there."""
-        rows = course.rows(math.floor(reach[0]), self._end(course, reach[1]))
-        tick = np.arange(float(rows.tick[0]), float(rows.tick[-1]), pace)
-        return tick, _between(rows, tick)
+    def _played(self, course: Course, journal: Journal, reach: tuple[float, float]) -> list[Ahead]:
+        """The rows between two ticks at the slowest and the fastest pace that a link may have had.
 
-    def _end(self, course: Course, tick: float) -> int:
-        """A tick, or that of the plan's next stop where it is earlier; the plan is made up to there."""
-        course.plan(math.ceil(tick) + 1)
-        stop = course.stop()
-        return math.ceil(tick) if stop is None else min(math.ceil(tick), stop.tick)
-
-    def _stop_begin(
-        self, course: Course, reach: tuple[float, float], rested: float, pace: float, stops: Stops
-    ) -> float | None:
-        """Tick from which a link's own stop, at a pace of playback, ends at another; None where none does."""
-        tick, rows = self._played(course, reach, pace)
-        begin = _stop_begin(rows, int(np.abs(tick - rested).argmin()), stops)
-        return None if begin is None else float(tick[begin])
+        A stop from between these two is the longer of both at most, and what is gone while it waits
+        for a change of pace to be over.
+        """
+        slowest = min(journal.pace, 1.0) if journal.changing else journal.pace_most
+        return [ahead(course, reach, pace) for pace in sorted({slowest, journal.pace_most})]
 
     def _before(self, course: Course, tick: float, way: float) -> float:
         """The tick this much path before another; that of the last rest at the most."""
@@ -270,37 +255,6 @@ def _rested(away: Array, enough: float) -> tuple[int, int]:
     visits = np.split(near, np.flatnonzero(np.diff(near) > 1) + 1)
     first, latest = (visit[away[visit].argmin()] for visit in (visits[0], visits[-1]))
     return int(first), int(latest)
-
-
-def _between(rows: Setpoints, tick: Array) -> Setpoints:
-    """Rows at (N,) ticks that need not be whole, on the straight between two."""
-    below = np.floor(tick).astype(np.int64) - int(rows.tick[0])
-    share = (tick - np.floor(tick))[:, None]
-    low, high = rows[below], rows[np.minimum(below + 1, len(rows) - 1)]
-    return replace(
-        low,
-        nozzle_G=low.nozzle_G + share * (high.nozzle_G - low.nozzle_G),
-        slider=low.slider + share * (high.slider - low.slider),
-    )
-
-
-def _stop_begin(rows: Setpoints, rested: int, stops: Stops) -> int | None:
-    """Row from which a link's own stop ends at a row, by halving; None where none does."""
-    low, high = 0, rested
-    while low < high:
-        middle = (low + high) // 2
-        if _ends_at(rows, middle, stops) < rested:
-            low = middle + 1
-        else:
-            high = middle
-    near = [k for k in (low - 1, low) if k >= 0 and abs(_ends_at(rows, k, stops) - rested) <= 1]
-    return near[0] if near else None
-
-
-def _ends_at(rows: Setpoints, begin: int, stops: Stops) -> int:
-    """Row of the plan nearest to where a stop from another row on ends."""
-    end = stops(rows[begin:]).nozzle_G[-1]
-    return begin + int(np.linalg.norm(rows.nozzle_G[begin:] - end, axis=1).argmin())
 
 
 def _first_of(course: Course, line: int) -> float | None:

@@ -43,7 +43,7 @@ STANDSTILL: Final = 1e-4
 def rows_needed(profile: Profile) -> int:
     """Rows ahead with which ``path_true_stop`` can stop any plan of this profile's speeds."""
     longest = STRETCHES[-1] * _duration(profile, profile.limits.speed_max, profile.sliders.speed_max)
-    return math.ceil((_longest_wait(profile) + longest / 2.0) / profile.drives.period) + 2
+    return math.ceil((longest_wait(profile) + longest / 2.0) / profile.drives.period) + 2
 
 
 def ends_at_rest(slider: Array, profile: Profile) -> bool:
@@ -87,8 +87,8 @@ def _duration(profile: Profile, nozzle_speed: float, slider_speed: float) -> flo
     )
 
 
-def _longest_wait(profile: Profile) -> float:
-    """S the ramp may wait for the plan's own change of acceleration to be over."""
+def longest_wait(profile: Profile) -> float:
+    """S for which a stop's ramp may wait: for the plan's own change of acceleration to be over."""
     return 2.0 * profile.limits.acceleration_max / profile.limits.jerk_max
 
 
@@ -143,7 +143,7 @@ def _demands(values: Array, period: float) -> Array:
 def _candidates(plan: _Plan, profile: Profile) -> list[tuple[int, int]]:
     """(rows played before the ramp, rows of the ramp), soonest rest first, within the plan."""
     bound = _duration(profile, *plan.speeds) / plan.period
-    waits = np.linspace(0.0, _longest_wait(profile) / plan.period, STARTS)
+    waits = np.linspace(0.0, longest_wait(profile) / plan.period, STARTS)
     starts = {int(wait) for wait in waits}
     ramps = {max(2, math.ceil(stretch * bound)) for stretch in STRETCHES}
     pairs = {(start, ramp) for start in starts for ramp in ramps}

@@ -8,6 +8,7 @@ from cdhr_host.motion.leg import Leg
 from cdhr_host.motion.sampling import Timed
 from cdhr_host.motion.time_law import TimeLaw
 from cdhr_host.pipeline.course import Course, Placed
+from cdhr_host.pipeline.shift import Shift
 
 HALVINGS = 60
 """of a piece of a time law, down to rounding"""
@@ -43,14 +44,37 @@ def spot(course: Course, u: float) -> Spot | None:
 
 
 def when(course: Course, place: Spot) -> float | None:
-    """Ticks of another plan of the same text at which it is there; None where that is not planned."""
-    for placed in course.placed():
-        if (found := _within(placed, place)) is not None:
-            return found
+    """Ticks of a plan at which it is at a place; it is planned on as far as needed.
+
+    None where it never is, or was before what is kept of it.
+    """
+    while (found := _when(course, place)) is None and not course.over:
+        if _beyond(course, place):
+            return None
+        course.plan(course.staircase.tick)
+    return found
+
+
+def same_place(course: Course, u: float, other: Course) -> float | None:
+    """A time of a plan, in ticks -> the time at which another plan of the same text is there."""
+    if other is course:
+        return u
+    if (here := spot(course, u)) is not None:
+        return when(other, here)
+    shift = course.placed_at(u)
+    other.plan(other.staircase.tick)
+    for placed in other.placed():
+        if placed.cause == shift.cause and isinstance(placed.step, Shift):
+            return placed.begin + u - shift.begin
     return None
 
 
-def beyond(course: Course, place: Spot) -> bool:
+def _when(course: Course, place: Spot) -> float | None:
+    found = (_within(placed, place) for placed in course.placed())
+    return next((tick for tick in found if tick is not None), None)
+
+
+def _beyond(course: Course, place: Spot) -> bool:
     """Whether a course is planned further than a place already."""
     steps = [each.step for each in course.placed() if isinstance(each.step, Timed)]
     if not steps:

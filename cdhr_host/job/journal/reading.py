@@ -35,7 +35,9 @@ class Journal:
     pace: float
     """ticks of the plan in one of the drives', lately"""
     pace_most: float
-    """the same for what was fed, at most"""
+    """of what was fed, at most: up to 1 as ``pace``, above it the feed that the plan was made for"""
+    changing: bool
+    """whether the drives may have been on their way from one pace to another"""
     state: str
     """the last told"""
     reason: str
@@ -130,6 +132,7 @@ class _Reader:
             self._bead,
             self._pace,
             max(self._pace, self._fed.pace if self._fed else 0.0),
+            self._fed is not None and self._fed.pace > 0.0 and not self._fed.steady,
             self._turned.state,
             self._turned.reason,
             damage,

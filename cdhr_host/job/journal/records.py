@@ -50,7 +50,9 @@ class Fed:
     plan_tick: float
     """of the program's plan at 100 %"""
     pace: float = 0.0
-    """ticks of the plan in one of the drives', at most until then; 0 where it stays as it was executed"""
+    """feed override at most until then; 0 where the plan at 100 % is played as slowly as it was executed"""
+    steady: bool = False
+    """whether the drives have got to that override"""
 
 
 @dataclass(frozen=True, slots=True)
