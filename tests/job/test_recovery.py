@@ -171,7 +171,7 @@ def test_a_print_killed_at_another_feed_goes_on_as_exactly(
 
 
 @pytest.mark.parametrize(
-    ("feed", "at", "later"), [(0.3, 15.0, 0.3), (1.0, 15.0, 0.3), (2.0, 15.0, 0.3), (2.0, 6.29, 0.0)]
+    ("feed", "at", "later"), [(0.3, 15.0, 0.3), (1.0, 15.0, 0.3), (2.0, 15.0, 0.3), (2.0, 6.2907, 0.0)]
 )
 def test_a_print_killed_while_it_gains_speed_skips_nothing(
     tmp_path: Path, program: Program, whole: Setpoints, feed: float, at: float, later: float
