@@ -2,7 +2,8 @@
 
 A nozzle brakes before a sharp corner and accelerates after it, which it does best on a straight
 (``motion.corner``). So points up to REACH half-widths from such a corner are moved
-onto the chord to the last of them where none is further than SPENT half-widths from it. Two
+onto the chord to the last of them, or the next one after these, where none is further than SPENT half-widths
+from it. Two
 sharp corners nearer together than that twice become one.
 
 No point moves further than SPENT half-widths, so no place between two of them does, and the
@@ -19,11 +20,13 @@ from cdhr_host.values import Array, Flags, Ints
 SHARP = 0.25
 """Change of direction from which a corner needs a straight, about 14°."""
 REACH = 6.0
-"""half-widths, the longest straight made"""
+"""half-widths, how far from the corner points are moved"""
+FARTHEST = 12.0
+"""half-widths, the longest straight made: to the next point beyond those moved"""
 SPENT = 1 / 5
 """half-widths, how far a point may move: three fifths of the tolerance"""
 TRIES = (1.0, 0.8, 0.65, 0.5, 0.4)
-"""Of REACH, lengths that are tried."""
+"""Of REACH, lengths that are tried after that."""
 CALM = 0.75
 """Turns that may lie within two half-widths beyond a straight's end: where kernels overlap, the path is
 up to a sixth of the turns between them times h off, and with SPENT that must be less than a third of h."""
@@ -35,8 +38,10 @@ LEAST = 2.5
 """half-widths, the shortest straight made."""
 TOUCHING = 1e-9
 """m and rad: equal but for rounding, which must not decide what is moved."""
-SPECK = 0.01
-"""Of two corners' distance, what is left of it when they become one."""
+TOGETHER = 4
+"""Sharp corners that may become one, at most."""
+SPECK = 0.02
+"""Of the distance by which corners are moved to become one, what is left between them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +91,7 @@ def straightened(points: Array, feed: Array, h: float) -> tuple[Array, Moved]:
     firm = _firm(drawn, h)
     if len(points) < 3 or not len(drawn.sharp):
         return points, Moved(spent, firm)
-    drawn = _Drawn.of(_paired(drawn, feed, h, spent), drawn.sharp)
+    drawn = _gathered(drawn, feed, h, spent)
     whole, first, last = _joining(drawn, h)
     forth, back = _onwards(drawn, whole, h), _onwards(drawn.reversed(), whole[::-1], h)
     end = len(points) - 1
@@ -97,46 +102,72 @@ def straightened(points: Array, feed: Array, h: float) -> tuple[Array, Moved]:
 
 def reach(h: float) -> float:
     """m of path drawn before a point on which its place depends, and one segment more."""
-    return (2 * REACH + 2 * SPENT) * h
+    return (2 * FARTHEST + 2 * SPENT * TOGETHER) * h
 
 
 def _firm(drawn: _Drawn, h: float) -> int:
     """The first point that further drawing might move, or around which it might.
 
-    A sharp corner might be next: with a straight of its own, joined to the corner before it, or paired.
+    A sharp corner might be next: with a straight of its own, joined to the one before it, or one with others.
     """
     along, pair = drawn.along, 2 * SPENT * h
     sharp, end = drawn.sharp, along[-1]
     if len(sharp) and end - along[sharp[-1]] <= ALONE * h:
-        both = len(sharp) > 1 and along[sharp[-1]] - along[sharp[-2]] <= pair
-        sharp = sharp[: len(sharp) - both]
-        sharp, end = sharp[:-1], along[sharp[-1]]
-    place = end - REACH * h - pair
-    if len(sharp) and end - along[sharp[-1]] <= 2 * REACH * h + pair:
+        apart = np.flatnonzero(~_close(drawn, h))
+        begun = int(apart[-1]) + 1 if len(apart) else 0
+        if len(sharp) - begun <= TOGETHER:
+            sharp, end = sharp[:begun], along[sharp[begun]]
+    place = end - FARTHEST * h - pair
+    if len(sharp) and end - along[sharp[-1]] <= 2 * FARTHEST * h + pair:
         place = along[sharp[-1]]
     return int(np.searchsorted(along, place - TOUCHING))
 
 
-def _paired(drawn: _Drawn, feed: Array, h: float, spent: Array) -> Array:
-    """(M+1, 3) m: pairs of sharp corners that stand alone but for each other become one between them."""
-    points, length = drawn.points, np.diff(drawn.along)
-    inner = drawn.sharp[(drawn.sharp > 0) & (drawn.sharp < len(length) - 1)]
-    pair = inner[(drawn.turn[inner + 1] > SHARP) & (length[inner] <= 2 * SPENT * h)]
-    sharp = np.concatenate(([0], drawn.sharp, [len(length)]))
-    last, onwards = (drawn.along[sharp[np.searchsorted(sharp, pair) + i]] for i in (-1, 2))
-    alone = np.minimum(drawn.along[pair] - last, onwards - drawn.along[pair + 1]) >= ALONE * h
-    pair = pair[alone]
-    before, after = feed[pair] == feed[pair - 1], feed[pair] == feed[pair + 1]
-    pair, before = pair[before | after], before[before | after][:, None]
-    if not len(pair):
-        return points
-    middle = (points[pair] + points[pair + 1]) / 2
-    speck = SPECK * length[pair, None]
-    paired = points.copy()
-    paired[pair] = middle - np.where(before, speck * units(middle - points[pair - 1]), 0.0)
-    paired[pair + 1] = middle + np.where(before, 0.0, speck * units(points[pair + 2] - middle))
-    spent[pair] = spent[pair + 1] = (0.5 + SPECK) * length[pair]
-    return paired
+def _gathered(drawn: _Drawn, feed: Array, h: float, spent: Array) -> _Drawn:
+    """Sharp corners next to each other, and alone but for each other, become one in their middle.
+
+    The other points lie specks beside it on its straights, on the side whose feed is theirs.
+    """
+    first, last = _groups(drawn, h)
+    points, gone = drawn.points.copy(), []
+    for begin, end in zip(first.tolist(), last.tolist(), strict=True):
+        group = drawn.points[begin : end + 1]
+        middle, off = _middle(group)
+        inner = feed[begin:end]
+        before = int(np.argmin(np.append(inner == feed[begin - 1], False)))
+        if off > SPENT * h or (inner[before:] != feed[end]).any():
+            continue
+        speck = SPECK * off * (np.arange(len(group)) - before)[:, None]
+        onwards = np.where(speck < 0.0, middle - points[begin - 1], points[end + 1] - middle)
+        points[begin : end + 1] = middle + speck * units(onwards)
+        spent[begin : end + 1] = (1 + SPECK * len(inner)) * off
+        gone += [begin + k for k in range(len(group)) if k != before]
+    return _Drawn.of(points, np.setdiff1d(drawn.sharp, gone)) if gone else drawn
+
+
+def _groups(drawn: _Drawn, h: float) -> tuple[Ints, Ints]:
+    """First and last point of each group of sharp corners that might become one."""
+    sharp, along = drawn.sharp, drawn.along
+    heads = np.flatnonzero(np.concatenate(([True], ~_close(drawn, h)))[: len(sharp)])
+    tails = np.append(heads[1:], len(sharp)) - 1
+    ends = np.concatenate((along[:1], along[sharp], along[-1:]))
+    apart = np.minimum(along[sharp[heads]] - ends[heads], ends[tails + 2] - along[sharp[tails]])
+    some = (tails > heads) & (tails - heads < TOGETHER) & (apart >= ALONE * h)
+    return sharp[heads[some]], sharp[tails[some]]
+
+
+def _close(drawn: _Drawn, h: float) -> Flags:
+    """(K-1,) whether each sharp corner and the next are points in a row, near enough to become one."""
+    near = np.diff(drawn.along[drawn.sharp]) <= 2 * SPENT * h
+    return np.asarray(near & (np.diff(drawn.sharp) == 1), dtype=np.bool_)
+
+
+def _middle(group: Array) -> tuple[Array, float]:
+    """(N, 3) m -> the middle (3,) m of those two that are furthest apart, and how far from it all are."""
+    apart = np.linalg.norm(group[:, None] - group, axis=2)
+    one, other = np.unravel_index(int(np.argmax(apart)), apart.shape)
+    middle: Array = (group[one] + group[other]) / 2
+    return middle, float(norms(group - middle).max())
 
 
 def _joining(drawn: _Drawn, h: float) -> tuple[Flags, Ints, Ints]:
@@ -154,9 +185,11 @@ def _onwards(drawn: _Drawn, whole: Flags, h: float) -> tuple[Ints, Ints]:
     undone = ~np.append(whole, False) & (sharp < len(along) - 2)
     first, apart = sharp[undone], apart[undone]
     last, found = first.copy(), np.zeros(len(first), dtype=np.bool_)
-    for part in TRIES:
-        most = along[first] + np.minimum(part * REACH * h, apart / 2) + TOUCHING
-        end = np.searchsorted(along, most, "right") - 1
+    reaches = (along[first] + np.minimum(part * REACH * h, apart / 2) + TOUCHING for part in TRIES)
+    beyond = np.minimum(np.searchsorted(along, along[first] + REACH * h + TOUCHING, "right"), len(along) - 1)
+    farthest = along[first] + np.minimum(FARTHEST * h, apart / 2) + TOUCHING
+    near = np.where(along[beyond] <= farthest, beyond, first)
+    for end in (near, *(np.searchsorted(along, most, "right") - 1 for most in reaches)):
         usable = ~found & (end > first + 1) & (end < len(along) - 1)
         usable[usable] = _calm(drawn, first[usable], end[usable], h)
         usable[usable] = _fits(drawn, first[usable], end[usable], h)

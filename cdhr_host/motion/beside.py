@@ -2,11 +2,10 @@
 
 A corner needs little more than the way from its feed to rest. Where a straight is long enough, both its
 corners have what they need; else they share it evenly. So a corner's room depends on no more of the path
-than twice that. No shape reaches over a change of the feed. A straight
-goes on over points that are no corners.
+than twice that. A straight goes on over points that are no corners. Where the feed changes on it nearer to a
+corner than what that can make use of, the corner keeps to the lower of both feeds, up to the next change.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +16,9 @@ SWING = 1.6
 """Ways from the feed to rest that a corner can make use of: it slows down more gently where it swings out."""
 APART = 1 - 1e-6
 """Of each share, so that between two corners there is always a straight."""
+
+BOUNDLESS = 1e6
+"""m/s, a feed from which any straight is too short"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,9 +38,47 @@ class Allowance:
         """(M,) m that a corner can make use of on each segment."""
         return way(self.feed, self.acceleration, self.jerk)
 
-    def changes(self) -> Flags:
-        """(M-1,) whether another feed or share begins at each inner point."""
-        return np.asarray((np.diff(self.feed) != 0.0) | (np.diff(self.share) != 0.0), dtype=np.bool_)
+    def runs(self) -> Ints:
+        """(M,) number of the row of segments with one feed and one share that each is in."""
+        changes = (np.diff(self.feed) != 0.0) | (np.diff(self.share) != 0.0)
+        return np.concatenate(([0], np.cumsum(changes)))
+
+
+@dataclass(frozen=True, slots=True)
+class Paces:
+    """What shapes of K corners keep to before and after them."""
+
+    feed: Array
+    """(2, K) m/s"""
+    share: Array
+    """(2, K) of acceleration and jerk"""
+    even: Array
+    """(2, K) m in which no feed is lower"""
+
+    @classmethod
+    def of(cls, drawn: Array, corner: Ints, allowed: Allowance) -> "Paces":
+        """Of corners at points (K,) of a polyline."""
+        run = allowed.runs()
+        heads = np.flatnonzero(np.diff(run, prepend=-1))
+        borders = np.concatenate(([-np.inf], drawn[heads[1:]], [np.inf]))
+        own = np.stack((run[corner - 1], run[corner]))
+        other = np.stack((np.maximum(own[0] - 1, 0), np.minimum(own[1] + 1, len(heads) - 1)))
+        feed, share, at = allowed.feed[heads], allowed.share[heads], drawn[corner]
+
+        def even(runs: Ints) -> Array:
+            return np.stack((at - borders[runs[0]], borders[runs[1] + 1] - at))
+
+        lower = np.minimum(feed[own], feed[other])
+        over = way(lower, allowed.acceleration, allowed.jerk) > even(own)
+        return cls(
+            np.where(over, lower, feed[own]),
+            np.where(over, np.minimum(share[own], share[other]), share[own]),
+            np.where(over, even(other), even(own)),
+        )
+
+    def within(self, room: Array) -> "Paces":
+        """Up to (2, K) m."""
+        return Paces(self.feed, self.share, np.minimum(room, self.even))
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +91,7 @@ class Beside:
     """(2, K) m of straight that each can make use of"""
     room: Array
     """(2, K) m that each has"""
-    even: Array
-    """(2, K) m of that in which the feed stays"""
+    pace: "Paces"
     shared: Flags
     """(2, K) whether the straight is too short for all that both its ends can make use of"""
     ways: Array
@@ -77,15 +116,16 @@ class Beside:
 def beside(drawn: Array, corner: Ints, *, least: float, allowed: Allowance | None) -> Beside:
     """Of the corners at points ``corner`` (K,) of a polyline; ``drawn`` (M+1,) m is how far along each is."""
     at, count = drawn[corner], len(drawn) - 1
-    ways = np.full(count, math.inf) if allowed is None else np.maximum(allowed.ways(), 2 * least)
-    changes = np.zeros(count - 1, dtype=np.bool_) if allowed is None else allowed.changes()
-    even = _even(drawn, at, changes)
-    needed = np.minimum(np.stack((ways[corner - 1], ways[corner])), np.maximum(even, 2 * least))
+    allowed = allowed or Allowance(np.full(count, BOUNDLESS), np.ones(count), 1.0, 1.0)
+    ways = np.maximum(allowed.ways(), 2 * least)
+    pace = Paces.of(drawn, corner, allowed)
+    used = np.maximum(way(pace.feed, allowed.acceleration, allowed.jerk), 2 * least)
+    needed = np.minimum(used, np.maximum(pace.even, 2 * least))
     between = np.diff(at, prepend=drawn[0], append=drawn[-1])
     both = np.concatenate((ways[:1], needed[1])), np.concatenate((needed[0], ways[-1:]))
     room, short = _rooms(between, both, least), between < both[0] + both[1]
     shared = np.stack((short[:-1], short[1:]))
-    return Beside(at, needed, room, np.minimum(room, even), shared, ways, least)
+    return Beside(at, needed, room, pace.within(room), shared, ways, least)
 
 
 def _rooms(between: Array, needed: tuple[Array, Array], least: float) -> Array:
@@ -100,13 +140,6 @@ def _rooms(between: Array, needed: tuple[Array, Array], least: float) -> Array:
     ample = between >= left + right
     after, before = np.where(ample, left, part), np.where(ample, right, between - part)
     return np.asarray(APART * np.stack((before[:-1], after[1:])), dtype=np.float64)
-
-
-def _even(drawn: Array, at: Array, changes: Flags) -> Array:
-    """(2, K) m before and after each corner in which the feed stays."""
-    borders = np.concatenate(([-np.inf], drawn[1:-1][changes], [np.inf]))
-    right, left = np.searchsorted(borders, at, "right"), np.searchsorted(borders, at, "left") - 1
-    return np.asarray(np.stack((at - borders[left], borders[right] - at)), dtype=np.float64)
 
 
 def way(speed: Array, acceleration: float, jerk: float) -> Array:

@@ -89,9 +89,9 @@ def roundings(
         return _kernels(single.half)
     feed = _beside(allowed.feed, corner, 0.0)
     half, chords = widened(single, feed.max(axis=0), widths.usual, allowed)
-    share = _beside(allowed.share, corner, 0.0).min(axis=0)
-    limits = np.multiply.outer(np.array([allowed.acceleration, allowed.jerk]), share)
-    corners = Corners(single.turn, around.even, feed, limits, widths.own, widths.swings)
+    pace = around.pace
+    limits = np.multiply.outer(np.array([allowed.acceleration, allowed.jerk]), pace.share.min(axis=0))
+    corners = Corners(single.turn, pace.even, pace.feed, limits, widths.own, widths.swings)
     which = _worthwhile(half, corners, ~chords, widths.usual, allowed)
     return _shaped(_kernels(half), which, corners, around.shared) if len(which) else _kernels(half)
 
