@@ -181,13 +181,12 @@ def _joining(drawn: _Drawn, h: float) -> tuple[Flags, Ints, Ints]:
 def _onwards(drawn: _Drawn, whole: Flags, h: float) -> tuple[Ints, Ints]:
     """First and last point of each straight to be made after a sharp corner."""
     along, sharp = drawn.along, drawn.sharp
-    apart = np.diff(along[sharp], append=np.inf)
     undone = ~np.append(whole, False) & (sharp < len(along) - 2)
-    first, apart = sharp[undone], apart[undone]
+    first, half = sharp[undone], _halves(drawn)[undone]
     last, found = first.copy(), np.zeros(len(first), dtype=np.bool_)
-    reaches = (along[first] + np.minimum(part * REACH * h, apart / 2) + TOUCHING for part in TRIES)
+    reaches = (along[first] + np.minimum(part * REACH * h, half) + TOUCHING for part in TRIES)
     beyond = np.minimum(np.searchsorted(along, along[first] + REACH * h + TOUCHING, "right"), len(along) - 1)
-    farthest = along[first] + np.minimum(FARTHEST * h, apart / 2) + TOUCHING
+    farthest = along[first] + np.minimum(FARTHEST * h, half) + TOUCHING
     near = np.where(along[beyond] <= farthest, beyond, first)
     for end in (near, *(np.searchsorted(along, most, "right") - 1 for most in reaches)):
         usable = ~found & (end > first + 1) & (end < len(along) - 1)
@@ -195,6 +194,15 @@ def _onwards(drawn: _Drawn, whole: Flags, h: float) -> tuple[Ints, Ints]:
         usable[usable] = _fits(drawn, first[usable], end[usable], h)
         last[usable], found = end[usable], found | usable
     return first[found], last[found]
+
+
+def _halves(drawn: _Drawn) -> Array:
+    """(K,) m from each sharp corner to the point nearest to the middle between it and the next."""
+    along, sharp = drawn.along, drawn.sharp
+    middle = (along[sharp[:-1]] + along[sharp[1:]]) / 2
+    point = np.searchsorted(along, middle)
+    short = middle - along[point - 1] <= along[point] - middle + TOUCHING
+    return np.append(along[point - short] - along[sharp[:-1]], np.inf)
 
 
 def _calm(drawn: _Drawn, first: Ints, last: Ints, h: float) -> Flags:

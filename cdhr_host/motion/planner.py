@@ -201,7 +201,7 @@ class Planner:
         """(M,) whether a segment begins with a corner sharper than the stop angle."""
         before = direction[:1] if self._direction is None else self._direction[None]
         cosine = np.einsum("nk,nk->n", np.concatenate((before, direction[:-1])), direction)
-        sharp: Flags = cosine < math.cos(self._limits.stop_angle)
+        sharp: Flags = np.maximum(cosine, -1.0) < math.cos(self._limits.stop_angle)
         return sharp
 
     def _stand(self, duration: float, flow: float, line: int) -> Iterator[Stretch]:
