@@ -99,15 +99,17 @@ class Beside:
     least: float
     """m that each has at least where the straight is long enough"""
 
-    def firm(self, sure: int, edge: float, onward: float) -> float:
+    def firm(self, row: Ints, edge: float, onward: float) -> float:
         """m of the polyline up to which no further drawing changes the path.
 
-        The turns of the first ``sure`` corners stay as they are, and up to ``edge`` m the path does not turn
-        any more; the next corner can make use of ``onward`` m before it. A corner that shares a straight with
-        one that is not known is not known either.
+        The turns of the first N corners stay as they are, and up to ``edge`` m the path does not turn
+        any more; the next corner can make use of ``onward`` m before it. None in a row is known before all
+        are; ``row`` (N,) is the first in each one's. A corner that shares a straight with one that is not
+        known is not known either.
         """
-        last = sure - 1
-        if sure and edge - self.at[last] < self.needed[1, last] + onward:
+        last = len(row) - 1
+        if len(row) and edge - self.at[last] < self.needed[1, last] + onward:
+            last = int(row[last])
             last -= int(last > 0 and self.shared[0, last])
             return float(self.at[last] - max(self.least, self.needed[0, last]))
         return edge - max(self.least, onward)

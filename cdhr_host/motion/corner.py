@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cdhr_host.motion.approach import SHARP
 from cdhr_host.motion.beside import Allowance, Beside
 from cdhr_host.motion.chords import Turns, widened
 from cdhr_host.motion.swings import Corners, Swings, swung, time_around
@@ -22,6 +23,10 @@ ALONE = 0.999
 """Of the usual half-width, the least room on both sides of a corner that stands alone,"""
 WIDEST = 0.75
 """and of that room its widest kernel; the rest is left for changing speed."""
+ROW = 6
+"""Sharp corners with less room between them that stand alone all the same, at most;"""
+BETWEEN = 0.2
+"""and of the usual half-width, the least room of each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,11 +79,40 @@ class Widths:
 def turns(around: Beside, turn: Array, widths: Widths) -> Turns:
     """K corners, whose changes of direction are (K,), with the kernels they have each for itself."""
     reach = around.room.min(axis=0)
-    alone = reach >= ALONE * widths.usual
+    alone = _alone(around, turn, widths.usual)
     shared = np.minimum(widths.usual, widths.ends.min(axis=0) / 2)
     single = np.minimum(np.maximum(WIDEST * reach, np.minimum(reach, widths.usual)), 2 * widths.own / turn)
     half = np.where(alone, single, shared)
     return Turns(around.at, turn, half, alone, around.room, widths.ends, widths.borders)
+
+
+def open_rows(around: Beside, turn: Array, usual: float) -> Ints:
+    """(K,) the first of the row that each corner is in; itself in a row that is too long."""
+    row, number = _rows(around, turn, usual), np.arange(len(turn))
+    return np.asarray(np.where(number - row < ROW, row, number), dtype=np.intp)
+
+
+def _rows(around: Beside, turn: Array, usual: float) -> Ints:
+    """(K,) the first of the row that each corner is in: sharp ones with little room between them."""
+    sharp = turn >= SHARP
+    near = np.minimum(around.room[1, :-1], around.room[0, 1:]) < ALONE * usual
+    linked = np.concatenate(([False], near & sharp[:-1] & sharp[1:]))
+    return np.asarray(np.maximum.accumulate(np.where(linked, 0, np.arange(len(turn)))), dtype=np.intp)
+
+
+def _alone(around: Beside, turn: Array, usual: float) -> Flags:
+    """(K,) whether a corner has room enough on both sides, or stands in a row that has it at both ends."""
+    roomy = around.room >= ALONE * usual
+    alone = np.asarray(roomy.all(axis=0), dtype=np.bool_)
+    if alone.all():
+        return alone
+    row = _rows(around, turn, usual)
+    heads = np.flatnonzero(row == np.arange(len(row)))
+    tails = np.append(heads[1:], len(row)) - 1
+    count = tails - heads + 1
+    enough = np.minimum.reduceat(around.room.min(axis=0), heads) >= BETWEEN * usual
+    stands = (count > 1) & (count <= ROW) & roomy[0, heads] & roomy[1, tails] & enough
+    return np.asarray(alone | np.repeat(stands, count), dtype=np.bool_)
 
 
 def roundings(
@@ -92,7 +126,7 @@ def roundings(
     pace = around.pace
     limits = np.multiply.outer(np.array([allowed.acceleration, allowed.jerk]), pace.share.min(axis=0))
     corners = Corners(single.turn, pace.even, pace.feed, limits, widths.own, widths.swings)
-    which = _worthwhile(half, corners, ~chords, widths.usual, allowed)
+    which = _worthwhile(half, corners, single.alone & ~chords, allowed)
     return _shaped(_kernels(half), which, corners, around.shared) if len(which) else _kernels(half)
 
 
@@ -111,15 +145,13 @@ def _beside(values: Array, corner: Ints, end: float) -> Array:
     return np.stack((padded[corner], padded[corner + 1]))
 
 
-def _worthwhile(half: Array, around: Corners, single: Flags, h: float, allowed: Allowance) -> Ints:
-    """Corners with room on both sides at which a kernel would hold up a change of speed.
+def _worthwhile(half: Array, around: Corners, alone: Flags, allowed: Allowance) -> Ints:
+    """Corners that stand ``alone`` (K,) at which a kernel would hold up a change of speed.
 
-    Only ``single`` (K,) ones, not chords that are smoothed together. Not where the air bounds that change:
-    a flow that falls and rises within a corner is the hardest for it.
+    Not where the air bounds that change: a flow that falls and rises within a corner is the hardest for it.
     """
     slow = _kernel_speed(half, around) < around.feed.max(axis=0)
-    roomy = around.room.min(axis=0) >= ALONE * h
-    return np.flatnonzero(slow & roomy & single & (around.limits[0] >= allowed.acceleration))
+    return np.flatnonzero(slow & alone & (around.limits[0] >= allowed.acceleration))
 
 
 def _kernel_speed(half: Array, around: Corners) -> Array:

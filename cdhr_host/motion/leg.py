@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cdhr_host.errors import MotionError, Problem
-from cdhr_host.motion import approach, chords
+from cdhr_host.motion import approach, chords, corner
 from cdhr_host.motion.beside import Allowance, way
 from cdhr_host.motion.budget import Bends
 from cdhr_host.motion.cells import TOUCHING, Cells, cells
@@ -268,11 +268,13 @@ class LegPlanner:
 
         A corner whose rounding goes on there lies at most one room before. It depends on the corner before it
         where they share a straight, two rooms more, and that on what lies beside it, as far again; a turn
-        depends on where points were moved, and how wide a kernel is on the turns around it.
+        depends on where points were moved, a corner on those in its row, and how wide a kernel is on the
+        turns around it.
         """
         limits = self._limits
         room = max(float(way(np.array(speed), limits.acceleration, limits.jerk)), 2 * limits.half_width)
         before = 2 * approach.reach(limits.half_width) + chords.reach(limits.half_width)
+        before += 2 * corner.ROW * limits.half_width
         return 5 * room + before
 
     def _too_fast(self, speed: float) -> MotionError:

@@ -30,7 +30,7 @@ from cdhr_host.motion import chords
 from cdhr_host.motion.approach import Moved
 from cdhr_host.motion.beside import Allowance, Beside, beside
 from cdhr_host.motion.chords import Turns
-from cdhr_host.motion.corner import Rounding, Widths, roundings, turns
+from cdhr_host.motion.corner import Rounding, Widths, open_rows, roundings, turns
 from cdhr_host.motion.vectors import norms
 from cdhr_host.values import Array, Flags, Ints
 
@@ -171,7 +171,8 @@ def smooth(
     begins = points[0] + begin * direction[0], direction[0]
     coefficients = _coefficients(kinks, lasting[:, None], begins, (onwards, direction[segment]))
     here = np.flatnonzero(np.diff(knots, append=last) > 0)
-    known = -math.inf if moved is None else _known(around, corner, moved.firm - 1, drawn)
+    row = open_rows(around, turn, h)
+    known = -math.inf if moved is None else _known(around, row, corner, moved.firm - 1, drawn)
     if allowed is not None and moved is not None:
         known = _firm(single, known, float(drawn[moved.firm - 1]), drawn, h=h, allowed=allowed)
     known = _along(known, drawn, after)
@@ -213,14 +214,15 @@ def _coefficients(
     return np.stack([np.ascontiguousarray(rows.T) for rows in (value, slope, second, third)])
 
 
-def _known(around: Beside, corner: Ints, edge: int, drawn: Array) -> float:
+def _known(around: Beside, row: Ints, corner: Ints, edge: int, drawn: Array) -> float:
     """m of the polyline up to which no further drawing changes what single corners need.
 
-    Up to point ``edge`` the turns stay.
+    Up to point ``edge`` the turns stay; ``row`` (K,) is the first corner of the row each is in.
     """
     if edge < 1:
         return -math.inf
-    return around.firm(int(np.searchsorted(corner, edge)), float(drawn[edge]), around.ways[edge - 1])
+    sure = row[: int(np.searchsorted(corner, edge))]
+    return around.firm(sure, float(drawn[edge]), around.ways[edge - 1])
 
 
 def _firm(single: Turns, known: float, edge: float, drawn: Array, *, h: float, allowed: Allowance) -> float:
