@@ -32,7 +32,7 @@ CALM = 0.75
 up to a sixth of the turns between them times h off, and with SPENT that must be less than a third of h."""
 ONWARDS = 0.5
 """Least cosine between a moved segment and its straight."""
-ALONE = 2.0
+ALONE = 2.25
 """half-widths to other sharp corners, and the ends, that two must have to become one."""
 LEAST = 2.5
 """half-widths, the shortest straight made."""
@@ -40,6 +40,16 @@ TOUCHING = 1e-9
 """m and rad: equal but for rounding, which must not decide what is moved."""
 TOGETHER = 4
 """Sharp corners that may become one, at most."""
+SLANTED = 4.0
+"""half-widths, the longest side step between two sharp corners that is drawn slanted."""
+SLANTS = (1.4, 1.0, 0.75, 0.6, 0.45, 0.33, 0.25)
+"""half-widths, tried, by which its ends are moved apart,"""
+ROOM = 0.45
+"""and of the segments beside it, the most."""
+GENTLER = 0.95
+"""Of its turns, what must be left at the most,"""
+ACUTE = 1.4
+"""and less than a right angle of them: else its ends are further off than from the straight."""
 SPECK = 0.02
 """Of the distance by which corners are moved to become one, what is left between them."""
 
@@ -84,13 +94,15 @@ class Moved:
     """The first point that further drawing might move, or around which it might"""
 
 
-def straightened(points: Array, feed: Array, h: float) -> tuple[Array, Moved]:
-    """(M+1, 3) m, (M,) m/s -> points as they are to be driven."""
+def straightened(points: Array, feed: Array, lays: Flags, h: float) -> tuple[Array, Moved]:
+    """(M+1, 3) m, (M,) m/s, (M,) whether clay is laid -> points as they are to be driven."""
+    like = (np.diff(feed) == 0.0) & (np.diff(lays.astype(np.int8)) == 0)
     spent = np.zeros(len(points))
     drawn = _Drawn.of(points)
     firm = _firm(drawn, h)
     if len(points) < 3 or not len(drawn.sharp):
         return points, Moved(spent, firm)
+    drawn = _slanted(drawn, like, h, spent)
     drawn = _gathered(drawn, feed, h, spent)
     whole, first, last = _joining(drawn, h)
     forth, back = _onwards(drawn, whole, h), _onwards(drawn.reversed(), whole[::-1], h)
@@ -102,7 +114,7 @@ def straightened(points: Array, feed: Array, h: float) -> tuple[Array, Moved]:
 
 def reach(h: float) -> float:
     """m of path drawn before a point on which its place depends, and one segment more."""
-    return (2 * FARTHEST + 2 * SPENT * TOGETHER) * h
+    return (2 * FARTHEST + 2 * SLANTED + 2 * SPENT * TOGETHER) * h
 
 
 def _firm(drawn: _Drawn, h: float) -> int:
@@ -112,15 +124,61 @@ def _firm(drawn: _Drawn, h: float) -> int:
     """
     along, pair = drawn.along, 2 * SPENT * h
     sharp, end = drawn.sharp, along[-1]
-    if len(sharp) and end - along[sharp[-1]] <= ALONE * h:
-        apart = np.flatnonzero(~_close(drawn, h))
+    near = np.diff(along[sharp]) <= SLANTED * h
+    for close, onwards in ((near, SLANTED * h), (_close(drawn, h), ALONE * h)):
+        if not len(sharp) or along[-1] - along[sharp[-1]] > onwards:
+            continue
+        apart = np.flatnonzero(~close)
         begun = int(apart[-1]) + 1 if len(apart) else 0
         if len(sharp) - begun <= TOGETHER:
             sharp, end = sharp[:begun], along[sharp[begun]]
+            break
     place = end - FARTHEST * h - pair
     if len(sharp) and end - along[sharp[-1]] <= 2 * FARTHEST * h + pair:
         place = along[sharp[-1]]
     return int(np.searchsorted(along, place - TOUCHING))
+
+
+def _slanted(drawn: _Drawn, like: Flags, h: float, spent: Array) -> _Drawn:
+    """Steps to the side between two sharp corners, alone but for each other, become gentler ones.
+
+    Their ends are moved apart, along the segments before and after. ``like`` (M-1,) tells whether a segment
+    and the next are driven alike.
+    """
+    first = _steps(drawn, like, h)
+    if not len(first):
+        return drawn
+    points = drawn.points.copy()
+    ahead, after = (units(points[k + 1] - points[k]) for k in (first - 1, first + 1))
+    most = ROOM * np.minimum(
+        drawn.along[first] - drawn.along[first - 1], drawn.along[first + 2] - drawn.along[first + 1]
+    )
+    before = norms(units(points[first + 1] - points[first]) - ahead)
+    left = np.ones(len(first), dtype=np.bool_)
+    for part in SLANTS:
+        way = part * h
+        begin, end = drawn.points[first] - way * ahead, drawn.points[first + 1] + way * after
+        slant = units(end - begin)
+        off = np.maximum(way * norms(np.cross(ahead, slant)), way * norms(np.cross(after, slant)))
+        gentle = np.maximum(norms(slant - ahead), norms(after - slant)) <= np.minimum(GENTLER * before, ACUTE)
+        good = left & gentle & (off <= SPENT * h) & (way <= most)
+        points[first[good]], points[first[good] + 1] = begin[good], end[good]
+        spent[first[good]] = spent[first[good] + 1] = off[good]
+        left &= ~good
+    return _Drawn.of(points, drawn.sharp)
+
+
+def _steps(drawn: _Drawn, like: Flags, h: float) -> Ints:
+    """First points of steps to the side that may be slanted."""
+    sharp, along, points = drawn.sharp, drawn.along, drawn.points
+    gap = np.diff(along[sharp], prepend=along[0], append=along[-1])
+    pair = np.flatnonzero((gap[1:-1] <= SLANTED * h) & (np.minimum(gap[:-2], gap[2:]) > SLANTED * h))
+    pair = pair[(np.diff(sharp)[pair] == 1) & (gap[1:-1][pair] > 2 * SPENT * h)]
+    first = sharp[pair]
+    first = first[(first > 0) & (first < len(points) - 2)]
+    first = first[like[first - 1] & like[first]]
+    turns = np.diff(units(np.diff(points, axis=0)), axis=0)
+    return first[np.einsum("nk,nk->n", turns[first - 1], turns[first]) < 0.0]
 
 
 def _gathered(drawn: _Drawn, feed: Array, h: float, spent: Array) -> _Drawn:

@@ -80,10 +80,27 @@ def turns(around: Beside, turn: Array, widths: Widths) -> Turns:
     """K corners, whose changes of direction are (K,), with the kernels they have each for itself."""
     reach = around.room.min(axis=0)
     alone = _alone(around, turn, widths.usual)
-    shared = np.minimum(widths.usual, widths.ends.min(axis=0) / 2)
+    shared = _narrowed(np.minimum(widths.usual, widths.ends.min(axis=0) / 2), around, turn, widths, alone)
     single = np.minimum(np.maximum(WIDEST * reach, np.minimum(reach, widths.usual)), 2 * widths.own / turn)
     half = np.where(alone, single, shared)
     return Turns(around.at, turn, half, alone, around.room, widths.ends, widths.borders)
+
+
+def _narrowed(half: Array, around: Beside, turn: Array, widths: Widths, alone: Flags) -> Array:
+    """(K,) m: kernels that overlap, narrower around a corner that was moved by what they would leave it by.
+
+    Within two half-widths of it they turn by T, and leave the path by T/6 of them at most.
+    """
+    at, h = around.at, widths.usual
+    total = np.concatenate(([0.0], np.cumsum(turn)))
+    near = total[np.searchsorted(at, at + 2 * h, "right")] - total[np.searchsorted(at, at - 2 * h)]
+    tight = np.flatnonzero(~alone & (widths.own < h) & (near * h > 2 * widths.own))
+    narrow = half.copy() if len(tight) else half
+    for k in tight.tolist():
+        some = slice(*np.searchsorted(at, (at[k] - 3 * h, at[k] + 3 * h)).tolist())
+        beyond = np.maximum(np.abs(at[some] - at[k]) - 2 * h, 0.0)
+        narrow[some] = np.minimum(narrow[some], widths.own[k] + beyond)
+    return narrow
 
 
 def open_rows(around: Beside, turn: Array, usual: float) -> Ints:

@@ -231,7 +231,7 @@ class LegPlanner:
     def _path(self, segments: Segments, *, closes: bool) -> tuple[SmoothPath, Segments]:
         """The smoothed path of what is not forgotten, and the segments as it follows them."""
         h, dropped = self._limits.half_width, self._begin.dropped
-        points, moved = approach.straightened(segments.points, segments.feed, h)
+        points, moved = approach.straightened(segments.points, segments.feed, segments.clay > 0.0, h)
         allowed = self._allowed(segments)
         path = smooth(points, h, passed=dropped, closes=closes, allowed=allowed, moved=moved)
         return path, replace(segments, points=points)

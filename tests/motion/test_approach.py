@@ -48,7 +48,7 @@ def test_the_path_stays_within_the_tolerance_of_what_was_drawn(drawn, seed):
         .choice([0.002, 0.03, 0.1], 9)
         .repeat(len(points) // 9 + 1)[1 : len(points)]
     )
-    driven, moved = straightened(points, feed, H)
+    driven, moved = straightened(points, feed, feed > 0, H)
     assert norm(driven - points).max() <= SPENT * H * (1 + 1e-9)
     assert np.array_equal(driven[[0, -1]], points[[0, -1]])
     assert (norm(np.diff(driven, axis=0)) > 0).all()
@@ -59,16 +59,44 @@ def test_the_path_stays_within_the_tolerance_of_what_was_drawn(drawn, seed):
     assert norm(slope).max() <= 1 + 1e-9
 
 
+STEPS = st.lists(
+    st.tuples(
+        st.floats(-3.14, 3.14), st.sampled_from([5e-5, 1e-4, 2e-4, 5e-4, 9e-4, 1.4e-3, 3e-3, 8e-3, 0.02])
+    ),
+    min_size=3,
+    max_size=14,
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(STEPS, st.booleans(), st.integers(0, 9))
+def test_steps_between_sharp_corners_stay_within_the_tolerance(steps, zigzag, seed):
+    turns, lengths = np.array(steps).T
+    heading = np.cumsum(np.abs(turns) * (-1.0) ** np.arange(len(turns)) if zigzag else turns)
+    ways = lengths[:, None] * np.stack((np.cos(heading), np.sin(heading), 0.1 * np.sin(3 * heading)), axis=1)
+    points = np.concatenate((np.zeros((1, 3)), np.cumsum(ways, axis=0)))
+    feed = np.random.default_rng(seed).choice([0.03, 0.03, 0.03, 0.06], len(ways))
+    driven, moved = straightened(points, feed, feed < 0.05, H)
+    assert distance_to(driven, points).max() <= SPENT * H * (1 + 1e-9)
+    assert distance_to(points, driven).max() <= SPENT * H * (1 + 1e-9)
+    assert (norm(np.diff(driven, axis=0)) > 0).all()
+    path = smooth(driven, H, passed=0.0, closes=True, allowed=Allowance(feed, feed / feed, A, J), moved=moved)
+    _, position, slope, _ = path.at(np.linspace(0, path.end, 3000))
+    assert distance_to(position, points).max() <= H / 3 * (1 + 1e-6)
+    assert distance_to(points, position).max() <= H / 3 + path.end / 3000
+    assert norm(slope).max() <= 1 + 1e-9
+
+
 def test_what_has_no_sharp_corner_is_left_as_it_is():
     points = curves([0.0], [0.02], [1e-3])
-    driven, moved = straightened(points, np.ones(len(points) - 1), H)
+    driven, moved = straightened(points, np.ones(len(points) - 1), np.ones(len(points) - 1) > 0, H)
     assert driven is points
     assert not moved.spent.any()
 
 
 def test_two_corners_at_a_speck_become_one():
     points = np.array([[-0.02, 0, 0], [0, 0, 0], [0, 1e-4, 0], [-0.02, 1e-4, 0]])
-    driven, moved = straightened(points, np.array([0.06, 0.06, 0.03]), H)
+    driven, moved = straightened(points, np.array([0.06, 0.06, 0.03]), np.ones(3) > 0, H)
     assert np.allclose(driven[2], [0, 5e-5, 0])
     assert norm(driven[1:2] - driven[2:3]) == pytest.approx(1e-6)
     assert moved.spent[2] == pytest.approx(5.1e-5)

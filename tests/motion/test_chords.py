@@ -20,7 +20,7 @@ FAST = 0.1
 def smoothed(points, feed=FAST):
     """The path of a whole polyline (M+1, 3) m, and the points as they were moved."""
     feeds = np.full(len(points) - 1, feed)
-    moved, spent = approach.straightened(points, feeds, H)
+    moved, spent = approach.straightened(points, feeds, feeds > 0, H)
     allowed = Allowance(feeds, np.ones(len(feeds)), 0.5, 5.0)
     return smooth(moved, H, passed=0.0, closes=True, allowed=allowed, moved=spent)
 
