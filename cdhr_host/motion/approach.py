@@ -105,16 +105,19 @@ def straightened(points: Array, feed: Array, lays: Flags, h: float) -> tuple[Arr
     drawn = _slanted(drawn, like, h, spent)
     drawn = _gathered(drawn, feed, h, spent)
     whole, first, last = _joining(drawn, h)
-    forth, back = _onwards(drawn, whole, h), _onwards(drawn.reversed(), whole[::-1], h)
-    end = len(points) - 1
-    first = np.concatenate((first, forth[0], end - back[1]))
-    last = np.concatenate((last, forth[1], end - back[0]))
+    after, ends = _onwards(drawn, whole, h)
+    before, begins = (each[::-1] for each in _onwards(drawn.reversed(), whole[::-1], h))
+    begins = len(points) - 1 - begins
+    both = after & before
+    forth, back = both & (ends > drawn.sharp + 1), both & (begins < drawn.sharp - 1)
+    first = np.concatenate((first, drawn.sharp[forth], begins[back]))
+    last = np.concatenate((last, ends[forth], drawn.sharp[back]))
     return _moved(drawn, first, last, spent), Moved(spent, firm)
 
 
 def reach(h: float) -> float:
     """m of path drawn before a point on which its place depends, and one segment more."""
-    return (2 * FARTHEST + 2 * SLANTED + 2 * SPENT * TOGETHER) * h
+    return (3 * FARTHEST + 2 * SLANTED + 2 * SPENT * TOGETHER) * h
 
 
 def _firm(drawn: _Drawn, h: float) -> int:
@@ -135,7 +138,7 @@ def _firm(drawn: _Drawn, h: float) -> int:
             break
     place = end - FARTHEST * h - pair
     if len(sharp) and end - along[sharp[-1]] <= 2 * FARTHEST * h + pair:
-        place = along[sharp[-1]]
+        place = along[sharp[-1]] - FARTHEST * h
     return int(np.searchsorted(along, place - TOUCHING))
 
 
@@ -178,7 +181,8 @@ def _steps(drawn: _Drawn, like: Flags, h: float) -> Ints:
     first = first[(first > 0) & (first < len(points) - 2)]
     first = first[like[first - 1] & like[first]]
     turns = np.diff(units(np.diff(points, axis=0)), axis=0)
-    return first[np.einsum("nk,nk->n", turns[first - 1], turns[first]) < 0.0]
+    opposite = np.einsum("nk,nk->n", turns[first - 1], turns[first]) < 0.0
+    return np.asarray(first[opposite], dtype=np.intp)
 
 
 def _gathered(drawn: _Drawn, feed: Array, h: float, spent: Array) -> _Drawn:
@@ -231,15 +235,20 @@ def _middle(group: Array) -> tuple[Array, float]:
 def _joining(drawn: _Drawn, h: float) -> tuple[Flags, Ints, Ints]:
     """Which gaps between sharp corners (K-1,) become one straight, and the points on both sides of those."""
     first, last = drawn.sharp[:-1], drawn.sharp[1:]
-    whole = (last - first > 1) & (drawn.along[last] - drawn.along[first] <= 2 * REACH * h)
+    apart = drawn.along[last] - drawn.along[first]
+    whole = (last - first > 1) & (apart >= ALONE * h) & (apart <= 2 * REACH * h)
     whole[whole] = _fits(drawn, first[whole], last[whole], h)
     return whole, first[whole], last[whole]
 
 
-def _onwards(drawn: _Drawn, whole: Flags, h: float) -> tuple[Ints, Ints]:
-    """First and last point of each straight to be made after a sharp corner."""
+def _onwards(drawn: _Drawn, whole: Flags, h: float) -> tuple[Flags, Ints]:
+    """After each sharp corner (K,): whether a straight is or can be there, and up to which point.
+
+    That is the corner itself where none is made. Up to another sharp corner it may be as short as it is.
+    """
     along, sharp = drawn.along, drawn.sharp
-    undone = ~np.append(whole, False) & (sharp < len(along) - 2)
+    joined = np.append(whole | (np.diff(sharp) == 1), False)
+    undone = np.flatnonzero(~joined & (sharp < len(along) - 2))
     first, half = sharp[undone], _halves(drawn)[undone]
     last, found = first.copy(), np.zeros(len(first), dtype=np.bool_)
     reaches = (along[first] + np.minimum(part * REACH * h, half) + TOUCHING for part in TRIES)
@@ -251,7 +260,10 @@ def _onwards(drawn: _Drawn, whole: Flags, h: float) -> tuple[Ints, Ints]:
         usable[usable] = _calm(drawn, first[usable], end[usable], h)
         usable[usable] = _fits(drawn, first[usable], end[usable], h)
         last[usable], found = end[usable], found | usable
-    return first[found], last[found]
+    there, ends = joined | (along[sharp + 1] - along[sharp] >= 2 * h), sharp.copy()
+    there[undone] |= found
+    ends[undone] = last
+    return there, ends
 
 
 def _halves(drawn: _Drawn) -> Array:

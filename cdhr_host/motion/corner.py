@@ -17,6 +17,7 @@ from cdhr_host.motion.approach import SHARP
 from cdhr_host.motion.beside import Allowance, Beside
 from cdhr_host.motion.chords import Turns, widened
 from cdhr_host.motion.swings import Corners, Swings, swung, time_around
+from cdhr_host.motion.vectors import norms
 from cdhr_host.values import Array, Flags, Ints
 
 ALONE = 0.999
@@ -76,31 +77,43 @@ class Widths:
     """(K,) whether the nozzle may swing out there: not where that leads below what is drawn"""
 
 
-def turns(around: Beside, turn: Array, widths: Widths) -> Turns:
-    """K corners, whose changes of direction are (K,), with the kernels they have each for itself."""
+def turns(around: Beside, directions: tuple[Array, Array], widths: Widths) -> Turns:
+    """K corners between ``directions`` (K, 3) before and after, with the kernels each has for itself."""
+    turn = norms(directions[1] - directions[0])
     reach = around.room.min(axis=0)
     alone = _alone(around, turn, widths.usual)
-    shared = _narrowed(np.minimum(widths.usual, widths.ends.min(axis=0) / 2), around, turn, widths, alone)
+    shared = _narrowed(
+        np.minimum(widths.usual, widths.ends.min(axis=0) / 2), around, directions, widths, alone
+    )
     single = np.minimum(np.maximum(WIDEST * reach, np.minimum(reach, widths.usual)), 2 * widths.own / turn)
     half = np.where(alone, single, shared)
     return Turns(around.at, turn, half, alone, around.room, widths.ends, widths.borders)
 
 
-def _narrowed(half: Array, around: Beside, turn: Array, widths: Widths, alone: Flags) -> Array:
+def _narrowed(
+    half: Array, around: Beside, directions: tuple[Array, Array], widths: Widths, alone: Flags
+) -> Array:
     """(K,) m: kernels that overlap, narrower around a corner that was moved by what they would leave it by.
 
-    Within two half-widths of it they turn by T, and leave the path by T/6 of them at most.
+    With T the most that directions within two half-widths of it differ from one of them, before and after it
+    together, they leave the path by T/6 half-widths at most: partial summation, for a kernel leaves the less
+    of a turn, the further off that is.
     """
     at, h = around.at, widths.usual
-    total = np.concatenate(([0.0], np.cumsum(turn)))
-    near = total[np.searchsorted(at, at + 2 * h, "right")] - total[np.searchsorted(at, at - 2 * h)]
-    tight = np.flatnonzero(~alone & (widths.own < h) & (near * h > 2 * widths.own))
-    narrow = half.copy() if len(tight) else half
-    for k in tight.tolist():
-        some = slice(*np.searchsorted(at, (at[k] - 3 * h, at[k] + 3 * h)).tolist())
-        beyond = np.maximum(np.abs(at[some] - at[k]) - 2 * h, 0.0)
-        narrow[some] = np.minimum(narrow[some], widths.own[k] + beyond)
+    narrow = half.copy()
+    for k in np.flatnonzero(~alone & (widths.own < h)).tolist():
+        near = slice(*np.searchsorted(at, (at[k] - 2 * h, at[k] + 2 * h)).tolist())
+        if _differ(np.concatenate((directions[0][near][:1], directions[1][near]))) * h > 2 * widths.own[k]:
+            some = slice(*np.searchsorted(at, (at[k] - 3 * h, at[k] + 3 * h)).tolist())
+            beyond = np.maximum(np.abs(at[some] - at[k]) - 2 * h, 0.0)
+            narrow[some] = np.minimum(narrow[some], widths.own[k] + beyond)
     return narrow
+
+
+def _differ(direction: Array) -> float:
+    """(N, 3) -> the most that those after one of them and those before it differ from it, added."""
+    apart = np.linalg.norm(direction[:, None] - direction, axis=2)
+    return float((np.triu(apart).max(axis=1) + np.tril(apart).max(axis=1)).max())
 
 
 def open_rows(around: Beside, turn: Array, usual: float) -> Ints:

@@ -157,7 +157,7 @@ def smooth(
     swings = (directions[1] - directions[0])[:, 2] <= LEVEL * turn
     borders = drawn[(spent > 0.0) | _changes(allowed, len(points))]
     widths = Widths(h, h - 3.0 * spent[corner], ends, borders, swings)
-    single = turns(around, turn, widths)
+    single = turns(around, directions, widths)
     rounding = roundings(single, around, corner, widths, allowed)
     saved = np.zeros((2, len(points)))
     saved[:, corner] = rounding.saved
