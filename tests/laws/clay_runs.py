@@ -2,10 +2,12 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from cdhr_host.extrusion import AirStage, ticks
+from cdhr_host.job.changes import SHARES
 from cdhr_host.motion.leg import FeedOverride
 from cdhr_host.motion.playback import Pace, landing, ramp
 from cdhr_host.motion.ramps import HISTORY, Ahead, choices, longest
@@ -148,16 +150,21 @@ class Player:
     def _paced(self, first, begin, rate):
         part = self.score.last
 
-        def make(wait, lasting):
-            shaped = landing if rate == 1.0 else ramp
-            return part.pace.then(shaped(part.pace.start(float(begin + wait)), lasting, rate))
+        def make(target, wait, lasting):
+            shaped = landing if target == 1.0 else ramp
+            return part.pace.then(shaped(part.pace.start(float(begin + wait)), lasting, target))
 
         now = part.pace.start(float(first))
         last = math.ceil(now.u + (longest(self.profile) + self.air.change_lead) / self.period)
         plan = part.course.rows(math.floor(now.u), min(last, self.end))
         before = self.asked[self.asked.tick < first][-HISTORY:]
         ahead = Ahead(plan, before, part.course.nozzle, self.profile, self.flow)
-        chosen = next(choices(ahead, make, first, abs(rate - now.rate)))
+        targets = [rate if share == 1.0 else now.rate + share * (rate - now.rate) for share in SHARES]
+        chosen = next(  # as ``job.changes`` does: part of the way to a rate where there is no room for all of it
+            pace
+            for target in (targets if rate else targets[:1])
+            for pace in choices(ahead, partial(make, target), first, abs(target - now.rate))
+        )
         self.score = self.score.with_part(Part(part.tick, part.course, chosen))
 
     def _printed(self):
