@@ -160,7 +160,7 @@ class Player:
         before = self.asked[self.asked.tick < first][-HISTORY:]
         ahead = Ahead(plan, before, part.course.nozzle, self.profile, self.flow)
         targets = [rate if share == 1.0 else now.rate + share * (rate - now.rate) for share in SHARES]
-        chosen = next(  # as ``job.changes`` does: part of the way to a rate where there is no room for all of it
+        chosen = next(  # as ``job.changes`` does: part of the way where there is no room for all of it
             pace
             for target in (targets if rate else targets[:1])
             for pace in choices(ahead, partial(make, target), first, abs(target - now.rate))
