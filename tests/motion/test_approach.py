@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from motion_tracks import distance_to, moves, norm
 
-from cdhr_host.motion import approach
+from cdhr_host.motion import approach, corner
 from cdhr_host.motion.approach import SPENT, straightened
 from cdhr_host.motion.beside import Allowance
 from cdhr_host.motion.limits import MotionLimits
@@ -109,6 +109,57 @@ def test_a_corner_between_curves_takes_less_time(monkeypatch):
     assert better < _time(points) - 0.05
 
 
-def _time(points):
+def test_three_corners_at_a_speck_become_one_on_the_side_that_is_driven_alike():
+    points = np.array([[-0.02, 0, 0], [0, 0, 0], [0, -2e-4, 0], [1e-4, -2e-4, 0], [0.01, -0.01, 0]])
+    driven, moved = straightened(points, np.array([0.03, 0.06, 0.06, 0.06]), np.ones(4) > 0, H)
+    assert np.allclose(driven[1], [5e-5, -1e-4, 0])
+    assert norm(np.diff(driven[1:4], axis=0)).max() < 1e-5
+    assert moved.spent[1:4].min() > norm(driven[1:4] - points[1:4]).max() * (1 - 1e-9)
+
+
+def test_a_corner_just_after_a_change_of_feed_takes_little_more_time_than_without():
+    turned = [[0.02, 0, 0], [0.0202, 0, 0], [0.0202, 0.02, 0]]
+    points = np.array([[0, 0, 0], *turned])
+    changed, same = _time(points, np.array([0.03, 0.06, 0.06])), _time(points, np.array([0.03, 0.03, 0.06]))
+    assert changed < same + 0.01
+
+
+def test_a_corner_beside_a_chord_before_a_long_one_takes_no_more_time_than_without_the_chord():
+    with_chord = np.array([[0, 0, 0], [0.02, 0, 0], [0.0203, 5e-4, 0], [0.0238, 6.4e-3, 0], [0.03, 0.02, 0]])
+    assert _time(with_chord) < _time(np.delete(with_chord, 2, axis=0)) + 0.01
+
+
+@pytest.mark.parametrize(("turn", "back"), [(1.57, -1.57), (1.57, 1.57), (1.1, -1.15)])
+def test_corners_with_a_millimetre_between_them_take_less_time_than_kernels_that_overlap(
+    monkeypatch, turn, back
+):
+    heading = np.array([0.0, turn, turn + back])
+    ways = np.array([0.015, 9e-4, 0.015])[:, None] * np.stack(
+        (np.cos(heading), np.sin(heading), 0 * heading), 1
+    )
+    points = np.concatenate((np.zeros((1, 3)), np.cumsum(ways, axis=0)))
+    together = _time(points)
+    monkeypatch.setattr(corner, "ROW", 1)
+    monkeypatch.setattr(approach, "SLANTS", ())
+    assert together < _time(points) - 0.05
+
+
+def test_a_step_to_the_side_is_drawn_slanted_where_all_around_is_driven_alike(monkeypatch):
+    heading = np.array([0.0, 0.4, 0.0])
+    ways = np.array([0.015, 1.3e-3, 0.015])[:, None] * np.stack(
+        (np.cos(heading), np.sin(heading), 0 * heading), 1
+    )
+    points = np.concatenate((np.zeros((1, 3)), np.cumsum(ways, axis=0)))
+    driven, _ = straightened(points, np.full(3, 0.03), np.ones(3) > 0, H)
+    assert norm(driven - points)[1:3].min() > 0.5 * H
+    assert not norm(driven[:2] - points[:2])[0]
+    other, _ = straightened(points, np.full(3, 0.03), np.array([True, True, False]), H)
+    assert other is points
+    slanted = _time(points)
+    monkeypatch.setattr(approach, "SLANTS", ())
+    assert slanted < _time(points) - 0.03
+
+
+def _time(points, feed=0.03):
     planner = Planner(LIMITS, points[0])
-    return sum(leg.duration for leg in [*planner.stretches(moves(points, 0.03)), *planner.close()])
+    return sum(leg.duration for leg in [*planner.stretches(moves(points, feed)), *planner.close()])

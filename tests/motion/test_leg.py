@@ -37,6 +37,21 @@ def program(rng):
     return np.column_stack((points, np.zeros(len(points)))), np.array(feeds)
 
 
+def sidesteps(rng):
+    """Long lines and chords, and between them sharp corners at a few mm, some of them at another feed."""
+    points, feeds, heading = [np.zeros(2)], [], 0.0
+    for _ in range(rng.integers(4, 12)):
+        size = rng.choice([1e-4, 3e-4, 1e-3, 3e-3])
+        chords = [(rng.choice([2e-3, 7e-3]), rng.uniform(-0.1, 0.1)) for _ in range(rng.integers(1, 8))]
+        corners = [(size * rng.uniform(0.3, 1.5), rng.uniform(-3.1, 3.1)) for _ in range(rng.integers(1, 9))]
+        feed = rng.choice([0.02, 0.03, 0.1, 0.1])
+        for step, turn in [(rng.uniform(1e-3, 0.06), rng.uniform(-3, 3)), *chords, *corners]:
+            points.append(points[-1] + step * np.array([math.cos(heading), math.sin(heading)]))
+            feeds.append(feed if rng.uniform() < 0.9 else 0.06)
+            heading += turn
+    return np.column_stack((points, np.zeros(len(points)))), np.array(feeds)
+
+
 def planned(points, feeds, size, factor=1.0):
     """Stretches, planned after every ``size`` moves with all feeds times a factor."""
     planner = Planner(LIMITS, points[0]).fork(FeedOverride(factor))
@@ -59,10 +74,14 @@ def path_of(legs, number, count=2000):
     return np.concatenate(parts), end
 
 
-@settings(max_examples=6, deadline=None)
-@given(st.integers(0, 10**6), st.sampled_from([(1, 1.0), (2, 3.0), (7, 1.7)]))
-def test_the_path_does_not_depend_on_when_it_is_planned_nor_on_the_override(seed, how):
-    points, feeds = program(np.random.default_rng(seed))
+@settings(max_examples=10, deadline=None)
+@given(
+    st.sampled_from([program, sidesteps]),
+    st.integers(0, 10**6),
+    st.sampled_from([(1, 1.0), (2, 3.0), (7, 1.7)]),
+)
+def test_the_path_does_not_depend_on_when_it_is_planned_nor_on_the_override(drawn, seed, how):
+    points, feeds = drawn(np.random.default_rng(seed))
     whole, parts = planned(points, feeds, 10**6), planned(points, feeds, *how)
     assert {leg.number for leg in parts} == {leg.number for leg in whole}
     for number in {leg.number for leg in whole}:

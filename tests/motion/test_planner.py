@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -166,6 +167,19 @@ def test_corner_sharper_than_the_stop_angle_is_reached_exactly(run):
     assert distance_to(points[1:2], track.position_G).max() < 1e-6
     joined_batches = run([moves(points[:2], 0.05), moves(points[1:], 0.05, line=[2])])
     assert np.array_equal(joined_batches.position_G, track.position_G)
+
+
+def test_a_reversal_passes_its_point_by_the_tolerance_where_no_corner_stops(limits):
+    points = np.array([[0, 0, 0], [0.06, 0, 0], [0.01, 0, 0]])
+    times = []
+    for angle in (math.pi / 2, math.pi):
+        planner = Planner(replace(limits, stop_angle=angle), points[0])
+        legs = [*planner.stretches(moves(points, 0.05)), *planner.close()]
+        assert len({leg.number for leg in legs}) == (2 if angle < math.pi else 1)
+        times.append(sum(leg.duration for leg in legs))
+    assert times[1] < times[0] - 0.05
+    reached = max(leg.path.at(np.linspace(0.0, leg.path.end, 4000))[1][:, 0].max() for leg in legs)
+    assert 0.06 - limits.deviation <= reached <= 0.06 + limits.deviation
 
 
 def test_ticks_go_on_from_program_to_program(limits):
