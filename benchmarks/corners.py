@@ -52,6 +52,8 @@ CASES = {
     "infill of 6 mm, 45° and 135°": turned(
         (0, LONG), (45, 6.0), (135, 6.0), (-135, 6.0), (135, 6.0), (0, LONG)
     ),
+    "0.9 mm to the side, between corners of 63°": turned((0, LONG), (63, 0.9), (-63, LONG)),
+    "0.8 mm between corners of 90°": turned((0, LONG), (90, 0.8), (90, LONG)),
 }
 
 

@@ -42,9 +42,9 @@ TOGETHER = 4
 """Sharp corners that may become one, at most."""
 SLANTED = 4.0
 """half-widths, the longest side step between two sharp corners that is drawn slanted."""
-SLANTS = (1.4, 1.0, 0.75, 0.6, 0.45, 0.33, 0.25)
+SLANTS = tuple(2.0 * 0.9**k for k in range(22))
 """half-widths, tried, by which its ends are moved apart,"""
-ROOM = 0.45
+ROOM = 0.95
 """and of the segments beside it, the most."""
 GENTLER = 0.95
 """Of its turns, what must be left at the most,"""
