@@ -1,12 +1,14 @@
-"""Straight ways to sharp corners: what a slicer draws beside them as chords, drawn straight.
+"""What lies around sharp corners, drawn so that the nozzle brakes and accelerates on straights.
 
 A nozzle brakes before a sharp corner and accelerates after it, which it does best on a straight
-(``motion.corner``). So points up to REACH half-widths from such a corner are moved
-onto the chord to the last of them, or the next one after these, where none is further than SPENT half-widths
-from it. Two
-sharp corners nearer together than that twice become one.
+(``motion.corner``). So points are moved, none of them off by more than SPENT half-widths:
 
-No point moves further than SPENT half-widths, so no place between two of them does, and the
+* sharp corners a speck apart become one in their middle;
+* a short step to the side between two of them becomes a gentler one, where all is driven alike;
+* points up to REACH half-widths from a corner are moved onto the chord to the last of them, or the next one
+  after these, where a straight is or can be made on both of its sides.
+
+As no point is off by more than SPENT half-widths, no place between two of them is, and the
 corners themselves round by so much less.
 """
 
