@@ -138,10 +138,12 @@ def _firm(drawn: _Drawn, h: float) -> int:
         if len(sharp) - begun <= TOGETHER:
             sharp, end = sharp[:begun], along[sharp[begun]]
             break
-    place = end - FARTHEST * h - pair
+    place = end - pair
     if len(sharp) and end - along[sharp[-1]] <= 2 * FARTHEST * h + pair:
-        place = along[sharp[-1]] - FARTHEST * h
-    return int(np.searchsorted(along, place - TOUCHING))
+        place = along[sharp[-1]]
+    first = int(np.searchsorted(along, place - REACH * h - TOUCHING))
+    beyond = first > 0 and along[first - 1] >= place - FARTHEST * h - TOUCHING
+    return first - 1 if beyond else first
 
 
 def _slanted(drawn: _Drawn, like: Flags, h: float, spent: Array) -> _Drawn:

@@ -70,11 +70,11 @@ def test_problems_are_where_their_number_is_met(paper):
         for each in proof.problems
         if each.kind in {"bed", "force"}
     }
-    assert places["bed", 3] == pytest.approx(340, abs=0.1)
+    assert places["bed", 3] == pytest.approx(340, abs=0.3)  # a corner is cut by the tolerance
     worst = next(each for each in proof.problems if each.kind == "force" and each.line == 3)
     assert worst.value == pytest.approx(13.6, abs=0.2)
     assert places["force", 3] == pytest.approx(320, abs=1)
-    assert rows[:, 0].max() / MM == pytest.approx(340, abs=0.1)
+    assert rows[:, 0].max() / MM == pytest.approx(340, abs=0.3)
     assert rows[:, COLUMNS.index("margin")].min() < 0
 
 
