@@ -112,7 +112,7 @@ class Run:
         """Refuse the first row that needs an F when none was given; only that one."""
         for row, line in zip(rows, lines, strict=True):
             moves, given = has_travel(row), has_feed(row)
-            needed = moves or row[6] if row[0] == "1" else row[6] and not moves
+            needed = row[6] or (row[0] == "1" and moves)
             if needed and not given:
                 self.refuse(missing_feed(line, column))
             if needed or given:
