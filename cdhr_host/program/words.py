@@ -56,7 +56,12 @@ def straight(run: Run, block: Block) -> None:
 
 
 _TABLE: Final = (
-    KnownWord("G0", "XYZEF", "straight move, like G1; before the first F at the greatest speed, and without E", straight),
+    KnownWord(
+        "G0",
+        "XYZEF",
+        "straight move, like G1; before the first F at the greatest speed, and without E",
+        straight,
+    ),
     KnownWord(
         "G1", "XYZEF", "straight move; with E alone clay is pushed at rest, F being its rate", straight
     ),

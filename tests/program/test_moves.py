@@ -72,7 +72,9 @@ def test_a_first_g1_without_feed_is_refused_once() -> None:
     assert "F1200" in (problem.hint or "")
 
 
-@pytest.mark.parametrize("line", ["G1 E5", "G0 E5", "G0 X0 E1 Y0 Z0", "G0 X5 E5", "G1 X1 E5", "g1 x1", "G2 X2 I1"])
+@pytest.mark.parametrize(
+    "line", ["G1 E5", "G0 E5", "G0 X0 E1 Y0 Z0", "G0 X5 E5", "G1 X1 E5", "g1 x1", "G2 X2 I1"]
+)
 def test_what_needs_a_feed(line: str) -> None:
     assert only_problem(line + "\n").kind == "feed"
 
