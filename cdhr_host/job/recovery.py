@@ -210,7 +210,7 @@ class Resuming:
         """
         if journal.state != "fault" and not _cut(journal):
             return NEAR
-        return NEAR + max(each.stop_way(stops) for each in self._played(course, journal, known))
+        return NEAR + ahead(course, known, max(journal.pace_most, 1.0)).stop_way(stops)
 
     def _played(self, course: Course, journal: Journal, reach: tuple[float, float]) -> list[Ahead]:
         """The rows between two ticks at the slowest and the fastest pace that a link may have had.

@@ -142,7 +142,7 @@ def smooth(
     ``closes``, at the last; there the result is the drawn path. Otherwise it is exact only from
     the farthest reach of a kernel after the first point to as much before the last. Pieces begin
     where the first kernel does, at s = -h or before. With an allowance, corners that would cost much
-    speed are braked into.
+    speed take shapes.
     ``moved`` is what was done to the points already (``motion.approach``).
     """
     steps = np.diff(points, axis=0)

@@ -89,12 +89,19 @@ class Machine:
         return read_journal(max(self.folder.glob("*.journal")))
 
 
-def interrupted(tmp_path: Path, program: Program, at: float, *, hold: bool = False) -> Machine:
+def printing(tmp_path: Path, program: Program, at: float, *, feed: float = 1.0) -> tuple[Machine, Printer]:
+    """A print that has come to a time of the clock."""
     machine = Machine(tmp_path)
     printer = machine.printer()
+    printer.override(feed=feed)
     printer.adopt(program)
     printer.start()
     machine.run(printer, at)
+    return machine, printer
+
+
+def interrupted(tmp_path: Path, program: Program, at: float, *, hold: bool = False) -> Machine:
+    machine, printer = printing(tmp_path, program, at)
     if hold:
         printer.hold()
         while printer.state is not JobState.HELD:
@@ -157,12 +164,7 @@ def test_a_print_killed_at_another_feed_goes_on_as_exactly(
     tmp_path: Path, program: Program, whole: Setpoints, feed: float, at: float
 ) -> None:
     """A faster plan stops in another way than the plan at 100 % played as fast would."""
-    machine = Machine(tmp_path)
-    printer = machine.printer()
-    printer.override(feed=feed)
-    printer.adopt(program)
-    printer.start()
-    machine.run(printer, at)
+    machine, _ = printing(tmp_path, program, at, feed=feed)
     machine.killed()
     recovery = resumed(machine, program)
     assert recovery.sure
@@ -177,12 +179,7 @@ def test_a_print_killed_while_it_gains_speed_skips_nothing(
     tmp_path: Path, program: Program, whole: Setpoints, feed: float, at: float, later: float
 ) -> None:
     """The journal's last pace is not the one that the drives had when they stopped."""
-    machine = Machine(tmp_path)
-    printer = machine.printer()
-    printer.override(feed=feed)
-    printer.adopt(program)
-    printer.start()
-    machine.run(printer, at)
+    machine, printer = printing(tmp_path, program, at, feed=feed)
     printer.hold()
     while printer.state is not JobState.HELD:
         machine.run(printer, machine.clock.now() + 0.1)

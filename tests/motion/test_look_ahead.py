@@ -153,7 +153,7 @@ def test_straights_between_corners_with_gears_can_be_driven(rows):
 
 
 def test_what_is_slowed_down_to_through_gears_can_be_stopped_from():
-    # 20 times 0.7 and over 0.7 again must not look slower than what it was.
+    # Twenty changes from one gear to another must not look slower than what they were, by rounding.
     gear = np.tile([[1.0, 0.3], [1.0, 0.7]], 20)
     found = cells(np.tile([0.05, 1e-3], 20), 0.1, np.tile([0.5, 0.0], 20), np.tile([5.0, 0.0], 20), gear)
     _, forward = border_speeds(found, 0.0, 0.1)
