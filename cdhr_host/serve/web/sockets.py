@@ -28,20 +28,23 @@ class Listener:
     def __init__(self, socket: web.WebSocketResponse, session: Session) -> None:
         self.socket = socket
         self.session = session
-        self._waiting: asyncio.Queue[str] = asyncio.Queue(WAITING_MAX)
+        self._waiting: asyncio.Queue[tuple[str, bool]] = asyncio.Queue(WAITING_MAX)
+        self._answers = asyncio.Semaphore(WAITING_MAX // 2)
+        """So that one who asks much, and reads, has room left for what is told."""
         self._writer = asyncio.create_task(self._write())
 
     def tell(self, text: str) -> None:
         """Send when it can take it; a client that reads nothing is let go."""
         try:
-            self._waiting.put_nowait(text)
+            self._waiting.put_nowait((text, False))
         except asyncio.QueueFull:
             self._writer.cancel()
 
     async def answer(self, text: str) -> None:
         """Send, and read no further call before there is room; TimeoutError when nothing is read."""
         async with asyncio.timeout(READS_WITHIN):
-            await self._waiting.put(text)
+            await self._answers.acquire()
+            await self._waiting.put((text, True))
 
     def end(self) -> None:
         """No more."""
@@ -50,7 +53,10 @@ class Listener:
     async def _write(self) -> None:
         try:
             while True:
-                await self.socket.send_str(await self._waiting.get())
+                text, answers = await self._waiting.get()
+                await self.socket.send_str(text)
+                if answers:
+                    self._answers.release()
         except (ConnectionError, RuntimeError):
             return
         finally:
