@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -21,6 +22,10 @@ from cdhr_host.values import Array, Setpoints
 
 AS_WRITTEN: Final = 1.001
 """pace up to which the plan as written was played, perhaps slower; what it has above 1 is rounding"""
+STRIDE: Final = 4
+"""rows between looks at where a stop that begins there ends; in between it is looked at"""
+DOUBTFUL: Final = 40
+"""where one of them is nearer than this, in rows, or they are on both sides"""
 Stops = Callable[[Setpoints], Setpoints]
 """rows ahead -> the rows a link plays instead when it comes to rest by itself"""
 
@@ -37,12 +42,14 @@ class Ahead:
     """(N,) of it"""
     rows: Setpoints
 
-    def stop_begin(self, rested: float, stops: Stops) -> float | None:
-        """Tick from which on a link's own stop ends at another; None where none does."""
+    def stop_begins(self, rested: float, stops: Stops) -> list[float]:
+        """Ticks from which on a link's own stop ends at another, ascending; none where none does."""
         if (at := same_place(self.course, rested, self.played)) is None:
-            return None
-        row = _begin(self.rows, int(np.abs(self.tick - at).argmin()), stops)
-        return None if row is None else same_place(self.played, float(self.tick[row]), self.course)
+            return []
+        longest = rows_needed(self.course.staircase.profile)
+        rows = _begins(self.rows, int(np.abs(self.tick - at).argmin()), longest, stops)
+        found = (same_place(self.played, float(self.tick[row]), self.course) for row in rows)
+        return [tick for tick in found if tick is not None]
 
     def stop_way(self, stops: Stops) -> float:
         """m of a link's own stop from the first row on."""
@@ -92,17 +99,20 @@ def _between(rows: Setpoints, tick: Array) -> Setpoints:
     )
 
 
-def _begin(rows: Setpoints, rested: int, stops: Stops) -> int | None:
-    """Row from which a link's own stop ends at a row, by halving; None where none does."""
-    low, high = 0, rested
-    while low < high:
-        middle = (low + high) // 2
-        if _ends_at(rows, middle, stops) < rested:
-            low = middle + 1
-        else:
-            high = middle
-    near = [k for k in (low - 1, low) if k >= 0 and abs(_ends_at(rows, k, stops) - rested) <= 1]
-    return near[0] if near else None
+def _begins(rows: Setpoints, rested: int, longest: int, stops: Stops) -> list[int]:
+    """Rows from which a link's own stop ends at a row, one of each row of neighbours that do.
+
+    A stop is as long as what lies ahead is fast. So one that begins on a slow move before a fast one
+    may end where another does that begins much later.
+    """
+    coarse = [*range(max(rested - longest, 0), rested, STRIDE), rested]
+    off = {k: _ends_at(rows, k, stops) - rested for k in coarse}
+    for one, other in pairwise(coarse):
+        if off[one] * off[other] <= 0 or min(abs(off[one]), abs(off[other])) <= DOUBTFUL:
+            off.update({k: _ends_at(rows, k, stops) - rested for k in range(one + 1, other)})
+    near = np.array(sorted(k for k, away in off.items() if abs(away) <= 1), dtype=np.intp)
+    groups = np.split(near, np.flatnonzero(np.diff(near) > 1) + 1) if len(near) else []
+    return [min(group.tolist(), key=lambda k: abs(off[k])) for group in groups]
 
 
 def _ends_at(rows: Setpoints, begin: int, stops: Stops) -> int:

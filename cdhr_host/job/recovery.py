@@ -194,12 +194,12 @@ class Resuming:
         if journal.state == "held" and tick[first] - last.plan_tick < 1.0:
             return last.plan_tick, last.plan_tick, float(away[first]), True
         played = self._played(course, journal, (last.plan_tick, reach))
-        begins = [each.stop_begin(float(tick[first]), stops) for each in played]
-        bead = min(last.plan_tick if begin is None else begin for begin in begins)
+        begins = [each.stop_begins(float(tick[first]), stops) for each in played]
+        bead = min(each[0] if each else last.plan_tick for each in begins)
         if journal.changing:
             bead -= longest_wait(self._rig.profile) / self._period * journal.pace_most
         as_links_do = journal.state != "fault" and not _cut(journal)
-        sure = begins[0] is not None and not journal.changing and first == latest and as_links_do
+        sure = len(begins[0]) == 1 and not journal.changing and first == latest and as_links_do
         return max(bead, last.plan_tick), float(tick[latest]), float(away[first]), sure
 
     def _astray(self, course: Course, journal: Journal, known: tuple[float, float], stops: Stops) -> float:

@@ -192,6 +192,23 @@ def test_a_print_killed_while_it_gains_speed_skips_nothing(
     checked(machine, whole, recovery)
 
 
+def test_a_stop_begun_on_a_slow_move_before_a_fast_one_leaves_no_gap(
+    tmp_path: Path, program: Program, whole: Setpoints
+) -> None:
+    """It ends where another would that began 20 mm later: what lies ahead makes it longer."""
+    machine, printer = printing(tmp_path, program, 14.3127, feed=2.0)
+    printer.hold()
+    while printer.state is not JobState.HELD:
+        machine.run(printer, machine.clock.now() + 0.1)
+    printer.resume()
+    machine.run(printer, machine.clock.now() + 1.0)
+    machine.clock.wait_until(machine.clock.now() + 0.37)
+    machine.killed()
+    recovery = resumed(machine, program)
+    assert not recovery.sure
+    checked(machine, whole, recovery)
+
+
 def test_a_print_killed_soon_after_a_pause_goes_on(tmp_path: Path) -> None:
     file = tmp_path / "paused.gcode"
     file.write_text("G1 X40 F1200\nG1 X40 Y20 E60\nM0\nG1 X40 Y-30 E160\nG1 X0 Y0\n")
