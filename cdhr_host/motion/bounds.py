@@ -2,6 +2,7 @@
 
 On each piece of the time law s', s'' and s''' are bounded by their values at its ends, and
 on the path pieces it runs over |q''|, |q'''| and their parts along the path are (motion.budget).
+Where a law has short pieces (motion.hastened) these are bounded together (motion.closely).
 """
 
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdhr_host.motion.budget import Bends
+from cdhr_host.motion.closely import close_bounds, overlapped
 from cdhr_host.motion.leg import Leg
 from cdhr_host.values import Array, Ints
 
@@ -33,17 +35,18 @@ class LegBounds:
 
 def leg_bounds(leg: Leg) -> LegBounds:
     """Bounds of a leg, from its time law and path alone."""
-    start, speed, change, jerk = leg.law.state
-    after = np.diff(leg.law.t, append=leg.law.duration)
-    rate = np.maximum(speed, speed + after * (change + after * jerk / 2))
-    harshest = np.maximum(np.abs(change), np.abs(change + after * jerk))
-    reached = np.clip((start, np.append(start[1:], leg.law.end)), *leg.law.within)
-    rows = _overlapped(leg.path.start, *reached)
+    pieces, (_, _, change, jerk) = leg.law.pieces, leg.law.state
+    rate = pieces.fastest()
+    harshest = np.maximum(np.abs(change), np.abs(change + pieces.lasting * jerk))
+    rows = overlapped(leg.path.start, *pieces.reached)
     bends = Bends(*(_largest(row, rows) for row in leg.bends.rows))
     segment = leg.path.segment
     steep, clay = leg.path.steep, leg.segments.clay[segment]
     acceleration = bends.acceleration(rate, harshest)
     jerks = bends.jerk(rate, harshest, np.abs(jerk))
+    close = np.flatnonzero(leg.law.close)
+    if len(close):
+        acceleration[close], jerks[close] = close_bounds(leg.path, pieces.only(close))
     flow = rate * _largest(clay * steep, rows)
     return LegBounds(
         float((rate * _largest(steep, rows)).max()),
@@ -53,13 +56,6 @@ def leg_bounds(leg: Leg) -> LegBounds:
         float(flow.max()),
         float(leg.segments.air.max()),
     )
-
-
-def _overlapped(pieces: Array, start: Array, end: Array) -> Ints:
-    """(2 K,) first path piece of each stretch of s, and the one after its last, in turn."""
-    first = np.maximum(np.searchsorted(pieces, start, side="right") - 1, 0)
-    last = np.maximum(np.searchsorted(pieces, end, side="left"), first + 1)
-    return np.column_stack((first, last)).ravel()
 
 
 def _largest(values: Array, rows: Ints) -> Array:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdhr_host.motion.budget import Bends, menu
+from cdhr_host.motion.budget import Bends, Menu, menu
 from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.smooth_path import SmoothPath
 from cdhr_host.values import Array, Flags, Ints
@@ -32,6 +32,8 @@ FREE = 0.6
 """A bend that leaves this share of the limits to changing speed goes together with its neighbours."""
 SHORT = 0.01
 """m, straights up to this length go together with such bends."""
+TOGETHER = 2
+"""Times MERGE or LASTING: how long rows of cells may be in which the speed changes as one."""
 TOUCHING = 1e-12
 """m, less is rounding."""
 
@@ -60,6 +62,8 @@ class Cells:
     """(K,) whether the cell lies in a long bend"""
     gear: Array
     """(2, K) |q'| at its start and at its end: the nozzle's speed there, of s' within it"""
+    together: Ints
+    """(K,) number of the row of cells in which the speed may change as one (motion.hastened); -1 in none"""
 
     @property
     def several(self) -> Flags:
@@ -78,6 +82,7 @@ class Cells:
             self.settled,
             self.bent[which],
             self.gear[:, which],
+            self.together[which],
         )
 
 
@@ -150,7 +155,21 @@ def cells(
         ways.share * limits.jerk,
         np.where(rows.shaped, rows.gear, 1.0),
     )
-    return Cells(rows.start, rows.length, ways.speed, a, j, min(span[1], last), rows.long, gear)
+    settled, together = min(span[1], last), _together(rows, ways, passed)
+    return Cells(rows.start, rows.length, ways.speed, a, j, settled, rows.long, gear, together)
+
+
+def _together(rows: _Stretches, ways: Menu, passed: float) -> Ints:
+    """(K,) numbers of rows of cells that turning holds up, with the straights between them.
+
+    They begin and end where the path and its feed alone say so. Where the air leaves a part of the limits
+    there are none.
+    """
+    held = (ways.speed[0] != ways.speed[-1]) | ~rows.bent
+    held &= ~rows.shaped & (rows.spend == 1.0)
+    place = _multiples(rows.start + passed, TOGETHER * _longest(rows.cap))
+    number = np.cumsum(np.diff(held, prepend=False) | (np.diff(place, prepend=0.0) != 0))
+    return np.where(held, number, -1)
 
 
 def _pushed_speed(rows: _Stretches, limits: MotionLimits) -> Array:

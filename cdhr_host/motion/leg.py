@@ -2,8 +2,8 @@
 
 Segments are collected until there are enough to plan. What is planned is committed up to
 the last border whose speed no further path can raise; the rest is planned again together
-with what follows. So memory stays bounded however long a leg is, and the result does not
-depend on when segments arrived.
+with what follows. So memory stays bounded however long a leg is. The path does not depend on
+when segments arrived; the time law does by little, where turning holds the nozzle up (motion.hastened).
 """
 
 import copy
@@ -18,8 +18,10 @@ from cdhr_host.motion.beside import Allowance, way
 from cdhr_host.motion.budget import Bends
 from cdhr_host.motion.cells import TOUCHING, Cells, cells
 from cdhr_host.motion.flow import FlowLimits
+from cdhr_host.motion.hastened import hastened
 from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.look_ahead import border_speeds, stoppable
+from cdhr_host.motion.nodes import Road
 from cdhr_host.motion.smooth_path import SmoothPath, smooth
 from cdhr_host.motion.time_law import TimeLaw, time_law
 from cdhr_host.motion.vectors import norms
@@ -212,12 +214,20 @@ class LegPlanner:
         count = len(found.start) if closes else 0 if slower else _settled(found, forward)
         if count == 0:
             return None
-        law = time_law(found.only(slice(count)), speeds[: count + 1])
+        law = self._law(found.only(slice(count)), speeds[: count + 1], segments, (path, bends))
         leg = Leg(path, bends, law, segments, self._number, passed)
         if not closes:
             self._advance(path, found, count, passed)
             self._entry = float(speeds[count])
         return leg
+
+    def _law(self, found: Cells, speeds: Array, segments: Segments, way: tuple[SmoothPath, Bends]) -> TimeLaw:
+        """Through cells, passing their borders at speeds (K+1,) m/s."""
+        path, bends = way
+        feed, _ = self._paces(segments)
+        allowed = np.minimum(feed, self._limits.speed)[path.segment] / path.steep
+        road = Road(path, bends, allowed, segments.room[path.segment], self._limits)
+        return hastened(time_law(found, speeds), found, speeds, road)
 
     def _always_long(self, *, closes: bool) -> tuple[float, float]:
         """m from both ends of what is planned in which a bend counts as long.
@@ -291,5 +301,6 @@ class LegPlanner:
 
 def _settled(found: Cells, forward: Array) -> int:
     """How many cells can be committed: up to a border with way enough to brake, whatever follows."""
-    usable = np.flatnonzero(stoppable(found, forward)[:-1])
+    apart = np.diff(found.together, prepend=-1) != 0
+    usable = np.flatnonzero(stoppable(found, forward)[:-1] & (apart | (found.together < 0)))
     return int(usable[-1]) if len(usable) else 0

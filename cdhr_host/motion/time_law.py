@@ -7,10 +7,11 @@ import numpy as np
 from cdhr_host.errors import MotionError, Problem
 from cdhr_host.motion.cells import Cells
 from cdhr_host.motion.choice import chosen
+from cdhr_host.motion.closely import Pieces
 from cdhr_host.motion.look_ahead import inside
 from cdhr_host.motion.speed_change import speed_change
 from cdhr_host.units import MM
-from cdhr_host.values import Array
+from cdhr_host.values import Array, Flags
 
 ROUNDING = 1e-10
 """m by which a change of speed may be longer than its cell."""
@@ -34,6 +35,15 @@ class TimeLaw:
     """(4, K) s (m), s' (m/s), s'' (m/s²) at the start, s''' (m/s³)"""
     within: Array
     """(2, K) m, first and last s of the cell it runs through, less what rounding might exceed"""
+    close: Flags
+    """(K,) whether a piece is so short that it is bounded closely (motion.closely)"""
+
+    @property
+    def pieces(self) -> Pieces:
+        """All of them."""
+        start = self.state[0]
+        reached = np.clip((start, np.append(start[1:], self.end)), *self.within)
+        return Pieces(self.state, np.diff(self.t, append=self.duration), reached)
 
     def at(self, t: Array) -> tuple[Array, Array, Array]:
         """(N,) s -> s, s', s'' (N,) each."""
@@ -114,4 +124,5 @@ def _integrated(begin: Array, speed: Array, last: float, duration: Array, jerk: 
     inside = INSIDE * max(abs(float(begin[0])), abs(last))
     within = np.stack((np.append(begin[0], begin[1:] + inside), np.append(begin[1:] - inside, last)))
     within = within.repeat(7, axis=1)
-    return TimeLaw(start, float(end[-1]), last, state.reshape(4, -1)[:, lasting], within[:, lasting])
+    state, within = state.reshape(4, -1)[:, lasting], within[:, lasting]
+    return TimeLaw(start, float(end[-1]), last, state, within, np.zeros(len(start), dtype=np.bool_))

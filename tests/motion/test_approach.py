@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from motion_tracks import distance_to, moves, norm
 
-from cdhr_host.motion import approach, corner
+from cdhr_host.motion import approach, corner, leg
 from cdhr_host.motion.approach import SPENT, straightened
 from cdhr_host.motion.beside import Allowance
 from cdhr_host.motion.limits import MotionLimits
@@ -138,6 +138,7 @@ def test_corners_with_a_millimetre_between_them_take_less_time_than_kernels_that
         (np.cos(heading), np.sin(heading), 0 * heading), 1
     )
     points = np.concatenate((np.zeros((1, 3)), np.cumsum(ways, axis=0)))
+    monkeypatch.setattr(leg, "hastened", lambda law, *_: law)
     together = _time(points)
     monkeypatch.setattr(corner, "ROW", 1)
     monkeypatch.setattr(approach, "SLANTS", ())

@@ -30,7 +30,8 @@ def cells(length, speed, a, j, gear=None):
     ways = max(x.shape[0] if x.ndim == 2 else 1 for x in limits)
     columns = (np.broadcast_to(x, (ways, len(length))) for x in limits)
     gear = np.ones((2, len(length))) if gear is None else np.asarray(gear, float)
-    return Cells(start, length, *columns, float(length.sum()), bent, gear)
+    apart = np.full(len(length), -1)
+    return Cells(start, length, *columns, float(length.sum()), bent, gear, apart)
 
 
 @given(SPEED, SPEED)
