@@ -155,9 +155,11 @@ def roundings(
     half, chords = widened(single, feed.max(axis=0), widths.usual, allowed)
     pace = around.pace
     limits = np.multiply.outer(np.array([allowed.acceleration, allowed.jerk]), pace.share.min(axis=0))
-    corners = Corners(single.turn, pace.even, pace.feed, limits, widths.own, widths.swings)
+    corners = Corners(
+        single.turn, pace.even, pace.feed, limits, widths.own, widths.swings, around.shared
+    )
     which = _worthwhile(half, corners, single.alone & ~chords, allowed)
-    return _shaped(_kernels(half), which, corners, around.shared) if len(which) else _kernels(half)
+    return _shaped(_kernels(half), which, corners) if len(which) else _kernels(half)
 
 
 def _kernels(half: Array) -> Rounding:
@@ -191,11 +193,11 @@ def _kernel_speed(half: Array, around: Corners) -> Array:
     return found
 
 
-def _shaped(found: Rounding, which: Ints, corners: Corners, shared: Flags) -> Rounding:
+def _shaped(found: Rounding, which: Ints, corners: Corners) -> Rounding:
     """With shapes instead of those kernels that they are quicker than."""
     around, half = corners.only(which), found.half[:, which]
     swings = swung(around)
-    limited = np.minimum(around.feed, _met(swings.speed, which, shared[:, which]))
+    limited = np.minimum(around.feed, _met(swings.speed, which, around.shared))
     slower = np.flatnonzero((limited < around.feed).any(axis=0))
     swings = swings.replaced(slower, swung(replace(around, feed=limited).only(slower)))
     speed = np.minimum(_kernel_speed(half[0], around), around.feed.min(axis=0))

@@ -24,7 +24,9 @@ from cdhr_host.values import Array, Flags
 STRICTER = 0.998, 1.5
 """A limit that is exceeded is less when planned again: by this, and this power of what is reached of it,"""
 BESIDE = 2
-"""in as many steps before and after it, too."""
+"""in as many steps before and after it, too;"""
+LITTLE = 1.001
+"""the speed in all steps by what is too much of it, if that is little: it comes back beside the place else."""
 ROUNDING = 1e-12
 """Part of a limit."""
 MOST = 1500
@@ -97,8 +99,10 @@ def _stricter(found: Row, reached: Array) -> Row:
     steps = found.steps
     beside = np.pad(reached, ((0, 0), (BESIDE, BESIDE)), mode="edge")
     most = np.max([beside[:, k : k + reached.shape[1]] for k in range(2 * BESIDE + 1)], axis=0)
-    less = np.where(most > 1.0, STRICTER[0] * most ** -STRICTER[1], 1.0)[:, None]
-    speed, acceleration, jerk = less * np.stack((steps.speed, steps.acceleration, steps.jerk))
+    less = np.where(most > 1.0, STRICTER[0] * most ** -STRICTER[1], 1.0)
+    if 1.0 < reached[0].max() <= LITTLE:
+        less[0] = float(reached[0].max()) ** -STRICTER[1]
+    speed, acceleration, jerk = less[:, None] * np.stack((steps.speed, steps.acceleration, steps.jerk))
     return replace(found, steps=replace(steps, speed=speed, acceleration=acceleration, jerk=jerk))
 
 

@@ -26,12 +26,10 @@ from cdhr_host.values import Array, Flags, Ints
 TABLE = files(__package__) / "corner_shapes.npz"
 """comes with the package, as its code does"""
 PIECES = 6
-PARTS = 2
+PARTS = 4
 """of each piece, on which it is looked at between its ends"""
 INSIDE = 1e-9
 """beyond the corner along one of its straights, where that is not allowed: rounding"""
-COARSE = 2
-"""Of how many speeds of the table one is tried first"""
 FAR = 1e6
 """instead of a distance, for what does not lead from one straight to the other"""
 WORTHS = 2
@@ -79,13 +77,6 @@ class Measured:
     """greatest"""
     off: Array
     """greatest distance from the drawn corner; FAR for what leads nowhere, or out where it must not"""
-
-    def at(self, rows: Ints) -> "Measured":
-        """Of (N, S) shapes those of rows (K,)."""
-        pairs = (each[:, rows] for each in (self.speed, self.peak, self.reach))
-        speed, peak, reach = pairs
-        jerk, duration = self.jerk[rows], self.duration[rows]
-        return Measured(jerk, duration, speed, peak, reach, self.acceleration[rows], self.off[rows])
 
 
 def measured(shapes: Shapes, turn: Array, swings: Flags) -> Measured:
@@ -196,20 +187,17 @@ def table() -> Table:
     return Table(angle, rows)
 
 
-def coarse(angle: Array, swings: Flags) -> tuple[tuple[Array, Ints], Measured]:
-    """Some of the table's shapes, at the nearest of its angles to each of K corners' (K,) rad.
+def states() -> tuple[Array, Ints]:
+    """Speeds of the table and worths (2, S) on both sides of all its shapes of one angle and kind."""
+    pair = np.indices((WORTHS * table().speeds,) * 2).reshape(2, -1)
+    return pair // WORTHS * 1.0, pair % WORTHS
 
-    Speeds of the table and worths (2, S) on both sides, and what the shapes (K, S) are.
-    """
-    held = table()
-    level = np.arange(0, held.speeds, COARSE)
-    state = (WORTHS * level[:, None] + np.arange(WORTHS)).ravel()
-    pair = np.stack(np.meshgrid(state, state, indexing="ij")).reshape(2, -1)
-    nearest = np.abs(angle[:, None] - held.angle).argmin(axis=1)
-    (out, here), row = np.unique(np.stack((swings.astype(np.intp), nearest)), axis=1, return_inverse=True)
-    shapes = Shapes.of(held.rows[out[:, None], here[:, None], pair[0], pair[1]])
-    found = measured(shapes, held.angle[here, None], out[:, None] > 0)
-    return (pair // WORTHS * 1.0, pair % WORTHS), found.at(row)
+
+@cache
+def held(angle: int, swings: bool) -> Measured:
+    """The shapes (1, S) of one of the table's angles and kinds, in the order of ``states``."""
+    rows = table().rows[int(swings), angle].reshape(1, -1, 3 * PIECES)
+    return measured(Shapes.of(rows), table().angle[angle], np.bool_(swings))
 
 
 def between(angle: Array, swings: Flags, level: Array, worth: Ints) -> Shapes:

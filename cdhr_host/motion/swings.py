@@ -10,19 +10,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdhr_host.motion.shapes import FAR, WORTHS, Measured, between, coarse, measured
+from cdhr_host.motion.shapes import FAR, WORTHS, Measured, between, held, measured, states, table
 from cdhr_host.values import Array, Flags, Ints
 
 STEPS = (
-    np.array([0.0, -1.0, 1.0, -2.0, 2.0]),
+    np.array([0.0, -1.0, 1.0]),
     np.array([0.0, -0.33, 0.33, -0.67, 0.67]),
     np.array([0.0, -0.15, 0.15]),
+    np.array([0.0, -0.07, 0.07]),
 )
 """Speeds of the table that are tried around the best so far, on each side."""
 ALIKE = 0.01, 0.02
 """rad between corners, and parts between rooms beside them, that get the same shape"""
 TOGETHER = 128
 """Corners looked at together, so that memory stays small."""
+MOST_KNOWN = 10_000
+"""Kinds of corners that are kept, for what is planned again."""
 HALVINGS = 12
 """Of an interval of speeds, to compare times."""
 TIED = 1e-9
@@ -47,6 +50,8 @@ class Corners:
     """(K,) m, three times the distance by which each may be left"""
     swings: Flags
     """(K,) whether the nozzle may swing out"""
+    shared: Flags
+    """(2, K) whether the straight is too short for all that the corners at both its ends can make use of"""
 
     @property
     def angle(self) -> Array:
@@ -57,21 +62,25 @@ class Corners:
     def only(self, which: Ints) -> "Corners":
         """Some of them."""
         room, feed, limits = self.room[:, which], self.feed[:, which], self.limits[:, which]
-        return Corners(self.turn[which], room, feed, limits, self.width[which], self.swings[which])
+        width, swings, shared = self.width[which], self.swings[which], self.shared[:, which]
+        return Corners(self.turn[which], room, feed, limits, width, swings, shared)
 
     def rounded(self) -> "Corners":
         """Without the last digits, in which sums along the path differ with where they begin."""
         turn, room, width = self.turn.round(RADIANS), self.room.round(METRES), self.width.round(METRES)
-        return Corners(turn, room, self.feed, self.limits, width, self.swings)
+        return replace(self, turn=turn, room=room, width=width)
 
     def kinds(self) -> tuple["Corners", Ints]:
         """One corner of each kind, and the kind (K,) of each."""
         turn, room = np.round(self.angle / ALIKE[0]), np.round(np.log(self.room) / ALIKE[1])
-        rows = np.vstack((turn, room, self.feed, self.limits, self.width, self.swings))
-        _, first, kind = np.unique(rows, axis=1, return_index=True, return_inverse=True)
-        some = self.only(first)
-        chord: Array = 2 * np.sin(ALIKE[0] * turn[first] / 2)
-        return replace(some, turn=chord, room=np.exp(ALIKE[1] * room[:, first])), kind
+        alike = replace(self, turn=2 * np.sin(ALIKE[0] * turn / 2), room=np.exp(ALIKE[1] * room))
+        _, first, kind = np.unique(alike.rows(), axis=1, return_index=True, return_inverse=True)
+        return alike.only(first), kind
+
+    def rows(self) -> Array:
+        """(12, K) all that is known of each."""
+        pairs = self.room, self.feed, self.limits, self.shared
+        return np.vstack((self.turn, *pairs, self.width, self.swings))
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +111,10 @@ class Swings:
             row[..., which] = getattr(others, name)
             rows.append(row)
         return Swings(*rows)
+
+
+_KNOWN: dict[bytes, list[float]] = {}
+"""Kinds of corners, and their speeds of the table and worths"""
 
 
 def swung(corners: Corners) -> Swings:
@@ -140,30 +153,42 @@ def _scale(found: Measured, around: Corners) -> Array:
 def _soonest(found: Measured, around: Corners) -> Ints:
     """(K,) the first of S shapes that are soonest from the middle of one segment in the middle of the next.
 
-    What is left of the segments is passed at the speeds of the shape's ends.
+    What is left of the segments is passed at the speeds of the shape's ends; where there is room for it,
+    the nozzle gains the feed there.
     """
     scale, jerk = _scale(found, around), around.limits[1][:, None]
     left = around.room[:, :, None] - jerk * scale**3 * found.reach
-    time = scale * found.duration + (left / (jerk * scale**2 * found.speed)).sum(axis=0)
+    speed, feed = jerk * scale**2 * found.speed, around.feed[:, :, None]
+    change = _change(feed - speed, around.limits[:, None, :, None])
+    cruise = left - (speed + feed) / 2 * change
+    gains = (cruise > 0.0) & ~around.shared[:, :, None]
+    time = scale * found.duration + np.where(gains, change + cruise / feed, left / speed).sum(axis=0)
     best: Ints = np.argmax(time <= time.min(axis=1, keepdims=True) * (1 + TIED), axis=1)
     return best
 
 
 def _best(around: Corners) -> tuple[Array, Ints]:
     """(2, K) speeds of the table, and (2, K) worths, on both sides of each of K corners."""
-    count = len(around.turn)
-    level, worth = np.empty((2, count)), np.empty((2, count), dtype=np.intp)
-    for first in range(0, count, TOGETHER):
-        some = np.arange(first, min(first + TOGETHER, count))
-        level[:, some], worth[:, some] = _searched(around.only(some))
-    return level, worth
+    if len(_KNOWN) > MOST_KNOWN:
+        _KNOWN.clear()
+    keys = [row.tobytes() for row in np.ascontiguousarray(around.rows().T)]
+    new = np.array([k for k, key in enumerate(keys) if key not in _KNOWN], dtype=np.intp)
+    for first in range(0, len(new), TOGETHER):
+        some = new[first : first + TOGETHER]
+        found = np.vstack(_searched(around.only(some))).T
+        _KNOWN.update((keys[k], row) for k, row in zip(some.tolist(), found.tolist(), strict=True))
+    level, worth = np.array([_KNOWN[key] for key in keys]).reshape(-1, 2, 2).transpose(1, 2, 0)
+    return level, worth.astype(np.intp)
 
 
 def _searched(around: Corners) -> tuple[Array, Ints]:
     """The same of few enough corners for the memory."""
-    tried, found = coarse(around.angle, around.swings)
-    best = _soonest(found, around)
-    level, worth = tried[0][:, best], tried[1][:, best]
+    best = np.empty(len(around.turn), dtype=np.intp)
+    nearest = np.abs(around.angle[:, None] - table().angle).argmin(axis=1)
+    for angle, swings in set(zip(nearest.tolist(), around.swings.tolist(), strict=True)):
+        some = np.flatnonzero((nearest == angle) & (around.swings == swings))
+        best[some] = _soonest(held(angle, swings), around.only(some))
+    level, worth = (each[:, best] for each in states())
     worths = _pairs(np.arange(WORTHS, dtype=np.float64)).astype(np.intp)
     for step in STEPS:
         level, worth = _chosen(around, level[:, :, None] + _pairs(step), worth[:, :, None])
