@@ -169,14 +169,17 @@ def _until_end(played: Array, end: float) -> Array:
 def _silent(ahead: Setpoints, played: Array, profile: Profile) -> Setpoints:
     """The plan at the playback times ``played``, in rows, with the air off."""
     tick: Ints = ahead.tick[:1] + np.arange(len(played), dtype=np.int64)
+    columns = ahead.nozzle_G, ahead.upper, ahead.slider, ahead.tension
+    borders = np.cumsum([each.shape[1] for each in columns])[:-1]
+    nozzle_G, upper, slider, tension = np.split(_at(np.hstack(columns), played), borders, axis=1)
     return Setpoints(
         tick=tick,
         t=np.asarray(tick * profile.drives.period, dtype=np.float64),
         line=ahead.line[played.astype(np.int64)],
-        nozzle_G=_at(ahead.nozzle_G, played),
-        upper=_at(ahead.upper, played),
-        slider=_at(ahead.slider, played),
-        tension=_at(ahead.tension, played),
+        nozzle_G=nozzle_G,
+        upper=upper,
+        slider=slider,
+        tension=tension,
         flow=np.zeros(len(played)),
         pressure=np.zeros(len(played)),
     )

@@ -332,7 +332,7 @@ def test_a_journal_cut_anywhere_resumes_rightly_or_says_why_not(tmp_path: Path, 
     true = way.found(read_journal(path), measured, machine.link.stop_rows, OVERLAP)
     ends = [at + 1 for at, byte in enumerate(whole) if byte == 0x0A]
     random = np.random.default_rng(5).integers(0, len(whole), 1000).tolist()
-    known: dict[tuple[object, ...], Recovery | None] = {}
+    known: dict[tuple[object, ...], tuple[Recovery, float] | None] = {}
     for size in {*ends, *random}:
         path.write_bytes(whole[:size])
         try:
@@ -342,10 +342,10 @@ def test_a_journal_cut_anywhere_resumes_rightly_or_says_why_not(tmp_path: Path, 
             continue
         what = cut.executed, cut.fed, cut.state
         if what not in known:
-            known[what] = _tried(way, cut, measured, machine)
-        found = known[what]
-        if found is not None:
-            laid_twice = way.length(found.tick, true.bead)
+            found = _tried(way, cut, measured, machine)
+            known[what] = found and (found, way.length(found.tick, true.bead))
+        if (told := known[what]) is not None:
+            found, laid_twice = told
             assert found.tick <= true.bead
             assert laid_twice <= found.overlap + 0.05 * MM
     assert sum(found is not None for found in known.values()) > 10

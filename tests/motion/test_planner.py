@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from motion_tracks import PERIOD, differences, distance_to, joined, moves, norm
 
+from cdhr_host.motion import leg, planner
 from cdhr_host.motion.leg import BATCH
 from cdhr_host.motion.planner import Planner, all_tracks
 from cdhr_host.motion.sampling import Timeline
@@ -119,10 +120,13 @@ def test_arc_with_rounded_end_goes_over_from_one_radius_to_the_other(run):
     assert np.allclose(track.position_G[-1], arc.end_G, atol=1e-12)
 
 
-def test_result_does_not_depend_on_how_moves_are_batched(run):
-    points = random_walk(5, 3 * BATCH, 3e-4)
+def test_result_does_not_depend_on_how_moves_are_batched(run, monkeypatch):
+    batch = 512
+    for module in (leg, planner):
+        monkeypatch.setattr(module, "BATCH", batch)
+    points = random_walk(5, 3 * batch, 3e-4)
     whole = run([moves(points, 0.03)], start=points[0])
-    cuts = [0, 1, 700, BATCH + 3, 2 * BATCH + 1, len(points) - 1]
+    cuts = [0, 1, 70, batch + 3, 2 * batch + 1, len(points) - 1]
     parts = [
         moves(points[a : b + 1], 0.03, line=np.arange(a + 1, b + 1)) for a, b in itertools.pairwise(cuts)
     ]
