@@ -16,7 +16,7 @@ import numpy as np
 from cdhr_host.motion.approach import SHARP
 from cdhr_host.motion.beside import Allowance, Beside
 from cdhr_host.motion.chords import Turns, widened
-from cdhr_host.motion.swings import Corners, Swings, swung, time_around
+from cdhr_host.motion.swings import TIED, Corners, Swings, swung, time_around
 from cdhr_host.motion.vectors import norms
 from cdhr_host.values import Array, Flags, Ints
 
@@ -156,7 +156,7 @@ def roundings(
     pace = around.pace
     limits = np.multiply.outer(np.array([allowed.acceleration, allowed.jerk]), pace.share.min(axis=0))
     corners = Corners(
-        single.turn, pace.even, pace.feed, limits, widths.own, widths.swings, around.shared
+        single.turn, pace.even, pace.feed, pace.feed, limits, widths.own, widths.swings, around.shared
     )
     which = _worthwhile(half, corners, single.alone & ~chords, allowed)
     return _shaped(_kernels(half), which, corners) if len(which) else _kernels(half)
@@ -197,9 +197,9 @@ def _shaped(found: Rounding, which: Ints, corners: Corners) -> Rounding:
     """With shapes instead of those kernels that they are quicker than."""
     around, half = corners.only(which), found.half[:, which]
     swings = swung(around)
-    limited = np.minimum(around.feed, _met(swings.speed, which, around.shared))
-    slower = np.flatnonzero((limited < around.feed).any(axis=0))
-    swings = swings.replaced(slower, swung(replace(around, feed=limited).only(slower)))
+    met = np.minimum(around.feed, _met(swings.speed, which, around.shared))
+    slower = np.flatnonzero((met * (1 + TIED) < swings.speed).any(axis=0))
+    swings = swings.replaced(slower, swung(replace(around, met=met).only(slower)))
     speed = np.minimum(_kernel_speed(half[0], around), around.feed.min(axis=0))
     usual = time_around(around, 2 * half[0] / speed, np.stack((speed, speed)), half)
     quicker = time_around(around, swings.duration.sum(axis=0), swings.speed, swings.reach) < usual

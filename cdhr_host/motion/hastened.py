@@ -26,7 +26,7 @@ STRICTER = 0.998, 1.5
 BESIDE = 2
 """in as many steps before and after it, too;"""
 LITTLE = 1.001
-"""the speed in all steps by what is too much of it, if that is little: it comes back beside the place else."""
+"""the speed everywhere, if it is exceeded by no more: else it is, beside the place, the next time."""
 ROUNDING = 1e-12
 """Part of a limit."""
 MOST = 1500

@@ -189,15 +189,15 @@ def table() -> Table:
 
 def states() -> tuple[Array, Ints]:
     """Speeds of the table and worths (2, S) on both sides of all its shapes of one angle and kind."""
-    pair = np.indices((WORTHS * table().speeds,) * 2).reshape(2, -1)
-    return pair // WORTHS * 1.0, pair % WORTHS
+    pair: Ints = np.indices((WORTHS * table().speeds,) * 2, dtype=np.intp).reshape(2, -1)
+    return (pair // WORTHS).astype(np.float64), pair % WORTHS
 
 
 @cache
 def held(angle: int, swings: bool) -> Measured:
     """The shapes (1, S) of one of the table's angles and kinds, in the order of ``states``."""
     rows = table().rows[int(swings), angle].reshape(1, -1, 3 * PIECES)
-    return measured(Shapes.of(rows), table().angle[angle], np.bool_(swings))
+    return measured(Shapes.of(rows), table().angle[[angle], None], np.full((1, 1), swings))
 
 
 def between(angle: Array, swings: Flags, level: Array, worth: Ints) -> Shapes:

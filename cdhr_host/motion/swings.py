@@ -44,6 +44,8 @@ class Corners:
     """(2, K) m, of the straights beside it"""
     feed: Array
     """(2, K) m/s"""
+    met: Array
+    """(2, K) m/s, greatest at both ends"""
     limits: Array
     """(2, K) m/s² and m/s³"""
     width: Array
@@ -59,11 +61,15 @@ class Corners:
         found: Array = 2 * np.arcsin(np.minimum(self.turn / 2, 1.0))
         return found
 
+    @property
+    def even(self) -> Flags:
+        """(K,) whether it is the same before as after, where neighbours may be alike."""
+        same = [each[0] == each[1] for each in (self.room, self.feed, self.met)]
+        return np.asarray(np.all(same, axis=0) & self.shared.all(axis=0), dtype=np.bool_)
+
     def only(self, which: Ints) -> "Corners":
         """Some of them."""
-        room, feed, limits = self.room[:, which], self.feed[:, which], self.limits[:, which]
-        width, swings, shared = self.width[which], self.swings[which], self.shared[:, which]
-        return Corners(self.turn[which], room, feed, limits, width, swings, shared)
+        return Corners(*(getattr(self, name)[..., which] for name in self.__slots__))
 
     def rounded(self) -> "Corners":
         """Without the last digits, in which sums along the path differ with where they begin."""
@@ -78,8 +84,8 @@ class Corners:
         return alike.only(first), kind
 
     def rows(self) -> Array:
-        """(12, K) all that is known of each."""
-        pairs = self.room, self.feed, self.limits, self.shared
+        """(14, K) all that is known of each."""
+        pairs = self.room, self.feed, self.met, self.limits, self.shared
         return np.vstack((self.turn, *pairs, self.width, self.swings))
 
 
@@ -139,22 +145,24 @@ def _scale(found: Measured, around: Corners) -> Array:
     """(K,) or (K, S) s for each unit of time: the fastest that keeps limits, tolerance, room and feeds."""
     more = (1,) * (found.off.ndim - 1)
     a, j = around.limits.reshape(2, -1, *more)
-    feed, room = (each.reshape(2, -1, *more) for each in (around.feed, around.room))
+    feed, met, room = (each.reshape(2, -1, *more) for each in (around.feed, around.met, around.room))
     bounds = (
         np.cbrt(around.width.reshape(-1, *more) / 3 / (j * found.off)),
         a / (j * found.acceleration),
         np.sqrt(feed / (j * found.peak)).min(axis=0),
+        np.sqrt(met / (j * found.speed)).min(axis=0),
         np.cbrt(room / (j * found.reach)).min(axis=0),
     )
     scale: Array = np.minimum.reduce(bounds)
     return scale
 
 
-def _soonest(found: Measured, around: Corners) -> Ints:
+def _soonest(found: Measured, around: Corners, lopsided: Flags) -> Ints:
     """(K,) the first of S shapes that are soonest from the middle of one segment in the middle of the next.
 
     What is left of the segments is passed at the speeds of the shape's ends; where there is room for it,
-    the nozzle gains the feed there.
+    the nozzle gains the feed there. What begins otherwise than it ends, ``lopsided`` (1 or K, S), does not go
+    together with neighbours that are alike.
     """
     scale, jerk = _scale(found, around), around.limits[1][:, None]
     left = around.room[:, :, None] - jerk * scale**3 * found.reach
@@ -163,8 +171,14 @@ def _soonest(found: Measured, around: Corners) -> Ints:
     cruise = left - (speed + feed) / 2 * change
     gains = (cruise > 0.0) & ~around.shared[:, :, None]
     time = scale * found.duration + np.where(gains, change + cruise / feed, left / speed).sum(axis=0)
+    time = np.where(around.even[:, None] & lopsided, np.inf, time)
     best: Ints = np.argmax(time <= time.min(axis=1, keepdims=True) * (1 + TIED), axis=1)
     return best
+
+
+def _lopsided(level: Array, worth: Ints) -> Flags:
+    """(2, ..., S) speeds of the table and worths -> (..., S)"""
+    return np.asarray((level[0] != level[1]) | (worth[0] != worth[1]), dtype=np.bool_)
 
 
 def _best(around: Corners) -> tuple[Array, Ints]:
@@ -187,8 +201,8 @@ def _searched(around: Corners) -> tuple[Array, Ints]:
     nearest = np.abs(around.angle[:, None] - table().angle).argmin(axis=1)
     for angle, swings in set(zip(nearest.tolist(), around.swings.tolist(), strict=True)):
         some = np.flatnonzero((nearest == angle) & (around.swings == swings))
-        best[some] = _soonest(held(angle, swings), around.only(some))
-    level, worth = (each[:, best] for each in states())
+        best[some] = _soonest(held(angle, swings), around.only(some), _lopsided(*states()))
+    level, worth = states()[0][:, best], states()[1][:, best]
     worths = _pairs(np.arange(WORTHS, dtype=np.float64)).astype(np.intp)
     for step in STEPS:
         level, worth = _chosen(around, level[:, :, None] + _pairs(step), worth[:, :, None])
@@ -201,7 +215,8 @@ def _chosen(around: Corners, level: Array, worth: Ints) -> tuple[Array, Ints]:
     shape = np.broadcast_shapes(level.shape, worth.shape)
     level, worth = np.broadcast_to(level, shape), np.broadcast_to(worth, shape)
     shapes = between(around.angle, around.swings, level, worth)
-    best = _soonest(measured(shapes, around.angle[:, None], around.swings[:, None]), around)
+    found = measured(shapes, around.angle[:, None], around.swings[:, None])
+    best = _soonest(found, around, _lopsided(level, worth))
     row = np.arange(len(best))
     return level[:, row, best], worth[:, row, best]
 
