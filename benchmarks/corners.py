@@ -34,6 +34,8 @@ SAMPLES = 4000
 """of the planner's motion, from which the search begins"""
 SMOKE = 1
 """corners looked at by a short run"""
+STRATEGIES = ("adaptive", "monotone")
+"""of lowering the barrier, tried one after the other"""
 
 
 def turned(*legs: tuple[float, float]) -> Array:
@@ -153,13 +155,14 @@ class Problem:
 
     def _solved(self, total: casadi.SX) -> float:
         variables, held = casadi.vertcat(*self._vars), casadi.vertcat(*(each for each, _ in self._held))
-        ipopt = {"print_level": 0, "sb": "yes", "max_iter": 1500, "tol": 1e-7, "mu_strategy": "adaptive"}
         problem = {"x": variables, "f": total, "g": held}
-        solver = casadi.nlpsol("free", "ipopt", problem, {"print_time": False, "ipopt": ipopt})
-        answer = solver(x0=self._from, lbg=[least for _, least in self._held], ubg=0.0)
-        if not solver.stats()["success"]:
-            raise SystemExit(f"no free motion found: {solver.stats()['return_status']}")
-        return float(answer["f"])
+        for strategy in STRATEGIES:
+            ipopt = {"print_level": 0, "sb": "yes", "max_iter": 1500, "tol": 1e-7, "mu_strategy": strategy}
+            solver = casadi.nlpsol("free", "ipopt", problem, {"print_time": False, "ipopt": ipopt})
+            answer = solver(x0=self._from, lbg=[least for _, least in self._held], ubg=0.0)
+            if solver.stats()["success"]:
+                return float(answer["f"])
+        raise SystemExit(f"no free motion found: {solver.stats()['return_status']}")
 
 
 def rows(count: int) -> Iterator[Row]:

@@ -53,8 +53,10 @@ def distance_to(points, polyline, chunk=2000):
     square = np.maximum((step**2).sum(axis=1), 1e-300)
     nearest = []
     for first in range(0, len(points), chunk):
-        offset = points[first : first + chunk, None, :] - start
-        u = np.clip((offset * step).sum(axis=2) / square, 0.0, 1.0)
-        gap = offset - u[..., None] * step
-        nearest.append(np.sqrt((gap**2).sum(axis=2).min(axis=1)))
+        some = points[first : first + chunk]
+        onwards = some @ step.T - (start * step).sum(axis=1)
+        u = np.clip(onwards / square, 0.0, 1.0)
+        # But for what is the same for all segments. Rounding may take one that is as near to some nanometres.
+        k = ((start**2).sum(axis=1) - 2 * some @ start.T + u * (u * square - 2 * onwards)).argmin(axis=1)
+        nearest.append(norm(some - start[k] - u[np.arange(len(k)), k, None] * step[k]))
     return np.concatenate(nearest)
