@@ -1,6 +1,7 @@
 """Corners with shapes: what their path promises, by looking at the path alone."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,11 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from motion_tracks import distance_to, moves, norm
 
+from cdhr_host.motion import swings
 from cdhr_host.motion.beside import Allowance
 from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.planner import Planner
 from cdhr_host.motion.shapes import Shapes, measured, table
 from cdhr_host.motion.smooth_path import smooth
+from cdhr_host.motion.swings import Corners, Swings, swung
 
 H, A, J = 0.75e-3, 0.5, 5.0
 
@@ -156,7 +159,62 @@ def test_shapes_are_what_they_are_measured_to_be():
         away = np.column_stack((away, np.zeros(3)))
         off = distance_to(np.column_stack((places, np.zeros(len(t)))), away).max()
         middle = norm(places[[np.flatnonzero(before)[-1]]])[0]
-        assert 0.9 * found.off <= max(off, middle) <= found.off + 2e-3
+        assert 0.94 * found.off <= max(off, middle) <= found.off + 2e-3
+
+
+def around(room, feed, count=1, degrees=45.0):
+    """Corners alike, between straights too short for changing speed."""
+    pair = np.ones((2, count))
+    limits = pair * np.array([[A], [J]])
+    turn = np.full(count, 2 * math.sin(math.radians(degrees) / 2))
+    wide, out = np.full(count, H), np.ones(count, dtype=np.bool_)
+    return Corners(turn, room * pair, feed * pair, feed * pair, limits, wide, out, pair > 0)
+
+
+@pytest.mark.parametrize(("room", "degrees"), [(5e-3, 45.0), (2e-3, 90.0), (1e-3, 120.0)])
+def test_a_corner_that_is_the_same_both_ways_gets_a_shape_that_is(room, degrees):
+    found = swung(around(room, 0.06, degrees=degrees))
+    assert np.isfinite(found.duration).all()
+    assert found.speed[0] == pytest.approx(found.speed[1], rel=2e-3)
+    assert found.reach[0] == pytest.approx(found.reach[1], rel=2e-3)
+
+
+@pytest.mark.parametrize("met", [0.02, 0.03, 0.04])
+def test_a_corner_ends_no_faster_than_it_is_met(met):
+    corners = around(5e-3, 0.06)
+    found = swung(replace(corners, met=corners.met * np.array([[1.0], [met / 0.06]])))
+    assert found.speed[1, 0] <= met * (1 + 1e-9)
+    assert found.speed[0, 0] > 0.03
+
+
+def test_what_is_known_of_kinds_of_corners_is_what_would_be_found(monkeypatch):
+    corners = around(np.linspace(1e-3, 9e-3, 7), 0.06, count=7)
+    monkeypatch.setattr(swings, "_KNOWN", {})
+    first = swung(corners)
+    assert len(swings._KNOWN) == 7
+    monkeypatch.setattr(swings, "_searched", None)
+    again = swung(corners)
+    for name in Swings.__slots__:
+        assert np.array_equal(getattr(first, name), getattr(again, name))
+
+
+def test_no_more_kinds_are_kept_than_the_memory_is_meant_for(monkeypatch):
+    monkeypatch.setattr(swings, "_KNOWN", {})
+    monkeypatch.setattr(swings, "MOST_KNOWN", 3)
+    for room in np.linspace(1e-3, 9e-3, 12):
+        swung(around(room, 0.06))
+        assert len(swings._KNOWN) <= 4
+
+
+def test_sides_of_an_octagon_are_driven_at_one_speed():
+    """Neighbours that are alike meet at the speed that each has by itself."""
+    angle = np.pi / 4 * np.arange(25)
+    ways = 0.01 * np.column_stack((np.cos(angle), np.sin(angle), 0 * angle))
+    points = np.concatenate((np.zeros((1, 3)), np.cumsum(ways, axis=0)))
+    planner = Planner(MotionLimits(0.1, A, J, H, math.pi), points[0])
+    legs = [*planner.stretches(moves(points, 0.06)), *planner.close()]
+    corner_time = swung(around(5e-3, 0.06)).duration.sum()
+    assert sum(leg.duration for leg in legs) < 24 * corner_time + 0.45
 
 
 def _stepped(shape, angle, found, count=20000):
