@@ -119,6 +119,8 @@ class Swings:
         return Swings(*rows)
 
 
+UNKNOWN = [np.nan] * 4
+"""instead of two speeds of the table and two worths"""
 _KNOWN: dict[bytes, list[float]] = {}
 """Kinds of corners, and their speeds of the table and worths"""
 
@@ -183,15 +185,17 @@ def _lopsided(level: Array, worth: Ints) -> Flags:
 
 def _best(around: Corners) -> tuple[Array, Ints]:
     """(2, K) speeds of the table, and (2, K) worths, on both sides of each of K corners."""
-    if len(_KNOWN) > MOST_KNOWN:
-        _KNOWN.clear()
     keys = [row.tobytes() for row in np.ascontiguousarray(around.rows().T)]
-    new = np.array([k for k, key in enumerate(keys) if key not in _KNOWN], dtype=np.intp)
+    # Looked up once: another thread that plans may forget them meanwhile.
+    found = np.array([_KNOWN.get(key, UNKNOWN) for key in keys]).reshape(-1, 4)
+    new = np.flatnonzero(np.isnan(found[:, 0]))
     for first in range(0, len(new), TOGETHER):
         some = new[first : first + TOGETHER]
-        found = np.vstack(_searched(around.only(some))).T
-        _KNOWN.update((keys[k], row) for k, row in zip(some.tolist(), found.tolist(), strict=True))
-    level, worth = np.array([_KNOWN[key] for key in keys]).reshape(-1, 2, 2).transpose(1, 2, 0)
+        found[some] = np.vstack(_searched(around.only(some))).T
+    if len(_KNOWN) > MOST_KNOWN:
+        _KNOWN.clear()
+    _KNOWN.update((keys[k], found[k].tolist()) for k in new.tolist())
+    level, worth = found.reshape(-1, 2, 2).transpose(1, 2, 0)
     return level, worth.astype(np.intp)
 
 

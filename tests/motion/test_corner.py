@@ -198,6 +198,22 @@ def test_what_is_known_of_kinds_of_corners_is_what_would_be_found(monkeypatch):
         assert np.array_equal(getattr(first, name), getattr(again, name))
 
 
+def test_what_another_thread_forgets_meanwhile_is_not_missed(monkeypatch):
+    """A file is proven in one thread while another plans what is printed."""
+    known, corners = {}, around(np.linspace(1e-3, 9e-3, 7), 0.06, count=7)
+    monkeypatch.setattr(swings, "_KNOWN", known)
+    whole, searched = swung(corners), swings._searched
+
+    def forgetful(some):
+        known.clear()
+        return searched(some)
+
+    for key in list(known)[::2]:
+        del known[key]
+    monkeypatch.setattr(swings, "_searched", forgetful)
+    assert np.array_equal(swung(corners).duration, whole.duration)
+
+
 def test_no_more_kinds_are_kept_than_the_memory_is_meant_for(monkeypatch):
     monkeypatch.setattr(swings, "_KNOWN", {})
     monkeypatch.setattr(swings, "MOST_KNOWN", 3)
