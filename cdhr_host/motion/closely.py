@@ -78,13 +78,20 @@ def overlapped(pieces: Array, start: Array, end: Array) -> Ints:
     return np.column_stack((first, last)).ravel()
 
 
+def met(rows: Ints) -> tuple[Ints, Ints, Ints]:
+    """Path pieces that K stretches meet, by pairs of rows (2 K,) as ``overlapped`` gives them.
+
+    (M,) the stretch, (M,) the piece, and (K,) where each stretch begins among these.
+    """
+    first, last = rows.reshape(-1, 2).T
+    count = last - first
+    which, heads = np.repeat(np.arange(len(count)), count), np.cumsum(count) - count
+    return which, first[which] + np.arange(len(which)) - heads[which], heads
+
+
 def close_bounds(path: SmoothPath, law: Pieces) -> tuple[Array, Array]:
     """(P,) m/s², (P,) m/s³: no less than the nozzle's acceleration and jerk on each piece of a law."""
-    begin, end = overlapped(path.start, *law.reached).reshape(-1, 2).T
-    count = end - begin
-    which = np.repeat(np.arange(len(count)), count)
-    heads = np.cumsum(count) - count
-    piece = begin[which] + np.arange(len(which)) - heads[which]
+    which, piece, heads = met(overlapped(path.start, *law.reached))
     found = _pair_bounds(path, piece, law.only(which))
     return np.maximum.reduceat(found[0], heads), np.maximum.reduceat(found[1], heads)
 

@@ -214,20 +214,15 @@ class LegPlanner:
         count = len(found.start) if closes else 0 if slower else _settled(found, forward)
         if count == 0:
             return None
-        law = self._law(found.only(slice(count)), speeds[: count + 1], segments, (path, bends))
+        settled, borders = found.only(slice(count)), speeds[: count + 1]
+        allowed = np.minimum(feed, self._limits.speed)[path.segment] / path.steep
+        road = Road(path, bends, allowed, segments.room[path.segment], self._limits)
+        law = hastened(time_law(settled, borders), settled, borders, road)
         leg = Leg(path, bends, law, segments, self._number, passed)
         if not closes:
             self._advance(path, found, count, passed)
             self._entry = float(speeds[count])
         return leg
-
-    def _law(self, found: Cells, speeds: Array, segments: Segments, way: tuple[SmoothPath, Bends]) -> TimeLaw:
-        """Through cells, passing their borders at speeds (K+1,) m/s."""
-        path, bends = way
-        feed, _ = self._paces(segments)
-        allowed = np.minimum(feed, self._limits.speed)[path.segment] / path.steep
-        road = Road(path, bends, allowed, segments.room[path.segment], self._limits)
-        return hastened(time_law(found, speeds), found, speeds, road)
 
     def _always_long(self, *, closes: bool) -> tuple[float, float]:
         """m from both ends of what is planned in which a bend counts as long.

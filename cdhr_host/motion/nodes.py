@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cdhr_host.motion.budget import Bends
-from cdhr_host.motion.closely import Pieces, overlapped
+from cdhr_host.motion.closely import Pieces, met, overlapped
 from cdhr_host.motion.limits import MotionLimits
 from cdhr_host.motion.smooth_path import SmoothPath
 from cdhr_host.motion.steps import Motion, Steps
@@ -107,10 +107,10 @@ def _nodes(
     """(N,) s and (N,) m: the path's borders, and instants between those that are far apart."""
     looks = np.linspace(*span, int((span[1] - span[0]) / LOOKS) + 2)
     borders = path.start[(path.start > s[0]) & (path.start < s[1])]
-    met = np.interp(borders, np.maximum.accumulate(law.at(looks)[0]), looks)
-    kept = _apart(met, span)
-    met, borders = met[kept], borders[kept]
-    marks = np.concatenate(([span[0]], met, [span[1]]))
+    passed = np.interp(borders, np.maximum.accumulate(law.at(looks)[0]), looks)
+    kept = _apart(passed, span)
+    passed, borders = passed[kept], borders[kept]
+    marks = np.concatenate(([span[0]], passed, [span[1]]))
     gaps = np.diff(marks)
     count = np.ceil(gaps / BETWEEN).astype(np.intp)
     part = np.concatenate([np.arange(1, each) / each for each in count])
@@ -120,10 +120,10 @@ def _nodes(
     return t[order], places[order]
 
 
-def _apart(met: Array, span: tuple[float, float]) -> list[int]:
+def _apart(instants: Array, span: tuple[float, float]) -> list[int]:
     """Which of ascending instants (N,) s are APART from the one before that is, and from both ends."""
     kept, last = [], span[0]
-    for k, t in enumerate(met.tolist()):
+    for k, t in enumerate(instants.tolist()):
         if t - last > APART and span[1] - t > APART:
             kept.append(k)
             last = t
@@ -139,12 +139,12 @@ def _steps(s: Array, road: Road) -> Steps:
     x = np.stack((s[:-1], s[1:])) - path.start[np.stack((begin, end))]
     q2 = bend + x * third
     q1 = slope + x * (bend + x * third / 2)
-    met = overlapped(path.start, s[:-1], s[1:])
-    q3 = path.coefficients[3][:, _sharpest(path, (s[:-1] + s[1:]) / 2, met)]
+    rows = overlapped(path.start, s[:-1], s[1:])
+    q3 = path.coefficients[3][:, _sharpest(path, (s[:-1] + s[1:]) / 2, rows)]
     pairs = (q1, q1), (q1, q2), (q2, q2), (q2, q3), (q1, q3), (q3, q3)
     turning = np.stack([(one * other).sum(axis=0) for one, other in pairs])
     turning[0] = np.maximum(turning[0], STEADY)
-    lowest = (least(each, met) for each in (road.speed, road.room))
+    lowest = (least(each, rows) for each in (road.speed, road.room))
     speed, acceleration, jerk = (np.tile(each, (2, 1)) for each in (*lowest, np.ones(count)))
     # What is given is not to be bounded.
     acceleration[0, 0] = acceleration[1, -1] = speed[0, 0] = speed[1, -1] = np.inf
@@ -160,12 +160,9 @@ def _steps(s: Array, road: Road) -> Steps:
     )
 
 
-def _sharpest(path: SmoothPath, middle: Array, met: Ints) -> Ints:
+def _sharpest(path: SmoothPath, middle: Array, rows: Ints) -> Ints:
     """(2, N) of the path's pieces that N steps meet before and after their middle, those with most |q'''|."""
-    first, last = met.reshape(-1, 2).T
-    which = np.repeat(np.arange(len(first)), last - first)
-    heads = np.cumsum(last - first) - (last - first)
-    piece = np.arange(len(which)) - heads[which] + first[which]
+    which, piece, heads = met(rows)
     sharp = (path.coefficients[3][:, piece] ** 2).sum(axis=0)
     ends = np.append(path.start[1:], path.end)
     on_side = path.start[piece] <= middle[which], ends[piece] >= middle[which]

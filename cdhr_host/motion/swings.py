@@ -201,12 +201,13 @@ def _best(around: Corners) -> tuple[Array, Ints]:
 
 def _searched(around: Corners) -> tuple[Array, Ints]:
     """The same of few enough corners for the memory."""
-    best = np.empty(len(around.turn), dtype=np.intp)
+    (level, worth), best = states(), np.empty(len(around.turn), dtype=np.intp)
+    lopsided = _lopsided(level, worth)
     nearest = np.abs(around.angle[:, None] - table().angle).argmin(axis=1)
     for angle, swings in set(zip(nearest.tolist(), around.swings.tolist(), strict=True)):
         some = np.flatnonzero((nearest == angle) & (around.swings == swings))
-        best[some] = _soonest(held(angle, swings), around.only(some), _lopsided(*states()))
-    level, worth = states()[0][:, best], states()[1][:, best]
+        best[some] = _soonest(held(angle, swings), around.only(some), lopsided)
+    level, worth = level[:, best], worth[:, best]
     worths = _pairs(np.arange(WORTHS, dtype=np.float64)).astype(np.intp)
     for step in STEPS:
         level, worth = _chosen(around, level[:, :, None] + _pairs(step), worth[:, :, None])
