@@ -9,7 +9,7 @@ from textual import events
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Horizontal
-from textual.screen import ModalScreen
+from textual.screen import ModalScreen, Screen
 from textual.widgets import Footer, Input, RichLog, Static
 
 from cdhr_host.console import panels
@@ -147,8 +147,9 @@ class Desk(App[None]):
 
     def say(self, text: str) -> None:
         """Add to the messages."""
-        for log in self.screen_stack[0].query(RichLog):  # gone at the very end
-            log.write(text)
+        for screen in self._own_screen():
+            for log in screen.query(RichLog):
+                log.write(text)
 
     def run_code(self, text: str) -> None:
         """Prove and run G-code; the answer becomes a message."""
@@ -328,6 +329,14 @@ class Desk(App[None]):
             "cables": panels.cables(status),
             "air": f"{panels.air(status)}  {self._jogging.label}",
         }
-        for name, text in shown.items():
-            for panel in self.screen_stack[0].query(f"#{name}").results(Static):  # gone at the very end
-                panel.update(text)
+        for screen in self._own_screen():
+            for name, text in shown.items():
+                for panel in screen.query(f"#{name}").results(Static):
+                    panel.update(text)
+
+    def _own_screen(self) -> list[Screen[object]]:
+        """The desk itself, whatever covers it: none, or an empty one, once the program shuts down.
+
+        The clock and the printer's thread go on for a moment after Textual has taken the screens away.
+        """
+        return self.screen_stack[:1]

@@ -188,3 +188,16 @@ def test_everything_is_on_the_screen(tmp_path: Path, size: tuple[int, int]) -> N
                 assert max(map(len, text)) <= hand.desk.query_one(f"#{name}").region.width
 
     run(whole())
+
+
+def test_the_clock_and_the_printer_may_outlive_the_screen(tmp_path: Path) -> None:
+    """Textual takes the screens away before it stops the timers."""
+
+    async def whole() -> None:
+        async with hands(tmp_path) as hand:
+            desk = hand.desk
+        assert not desk.screen_stack
+        desk.say("late")
+        desk._refresh()
+
+    run(whole())
