@@ -105,12 +105,13 @@ class Beside:
         The turns of the first N corners stay as they are, and up to ``edge`` m the path does not turn
         any more; the next corner can make use of ``onward`` m before it. None in a row is known before all
         are; ``row`` (N,) is the first in each one's. A corner that shares a straight with one that is not
-        known is not known either.
+        known is not known either, nor is one that might become a pair with it.
         """
         last = len(row) - 1
         if len(row) and edge - self.at[last] < self.needed[1, last] + onward:
             last = int(row[last])
-            last -= int(last > 0 and self.shared[0, last])
+            for _ in range(2):
+                last -= int(last > 0 and self.shared[0, last])
             return float(self.at[last] - max(self.least, self.needed[0, last]))
         return edge - max(self.least, onward)
 

@@ -16,6 +16,8 @@ import numpy as np
 from cdhr_host.motion.approach import SHARP
 from cdhr_host.motion.beside import Allowance, Beside
 from cdhr_host.motion.chords import Turns, widened
+from cdhr_host.motion.paired import Near, candidates, put, taken
+from cdhr_host.motion.rounding import Inner, Rounding, kernels
 from cdhr_host.motion.swings import TIED, Corners, Swings, swung, time_around
 from cdhr_host.motion.vectors import norms
 from cdhr_host.values import Array, Flags, Ints
@@ -28,37 +30,6 @@ ROW = 6
 """Sharp corners with less room between them that stand alone all the same, at most;"""
 BETWEEN = 0.2
 """and of the usual half-width, the least room of each."""
-
-
-@dataclass(frozen=True, slots=True)
-class Inner:
-    """Places within corners, besides begin, middle and end, at which q''' changes."""
-
-    corner: Ints
-    """(E,)"""
-    at: Array
-    """(E,) m in s after its middle"""
-    step: Array
-    """(2, E) 1/m², along d0 and d1"""
-
-
-@dataclass(frozen=True, slots=True)
-class Rounding:
-    """The stretches of s in which K corners are rounded; rows of pairs are before and after the middle."""
-
-    half: Array
-    """(2, K) m in s"""
-    saved: Array
-    """(2, K) m, by which each half is longer than the drawn way it stands for"""
-    gear: Array
-    """(2, K) |q'| where it begins and where it ends"""
-    steep: Array
-    """(2, K) greatest |q'| in each half"""
-    step: Array
-    """(3, 2, K) 1/m², by which q''' changes at the begin, in the middle and at the end, along d0 and d1"""
-    shaped: Flags
-    """(K,) whether it is a shape, not a kernel"""
-    inner: Inner
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,29 +117,38 @@ def _alone(around: Beside, turn: Array, usual: float) -> Flags:
 
 
 def roundings(
-    single: Turns, around: Beside, corner: Ints, widths: Widths, allowed: Allowance | None
+    single: Turns,
+    around: Beside,
+    corners: tuple[Ints, Array, Array],
+    widths: Widths,
+    allowed: Allowance | None,
 ) -> Rounding:
-    """Roundings of the corners at points ``corner`` (K,) of a polyline."""
+    """Roundings of K corners of a polyline: their points (K,), and directions (K, 3) before and after."""
+    corner, *directions = corners
     if allowed is None:
-        return _kernels(single.half)
+        return kernels(single.half)
     feed = _beside(allowed.feed, corner, 0.0)
     half, chords = widened(single, feed.max(axis=0), widths.usual, allowed)
     pace = around.pace
     limits = np.multiply.outer(np.array([allowed.acceleration, allowed.jerk]), pace.share.min(axis=0))
-    corners = Corners(
+    found = Corners(
         single.turn, pace.even, pace.feed, pace.feed, limits, widths.own, widths.swings, around.shared
     )
-    which = _worthwhile(half, corners, single.alone & ~chords, allowed)
-    return _shaped(_kernels(half), which, corners) if len(which) else _kernels(half)
+    which = _worthwhile(half, found, single.alone & ~chords, allowed)
+    if not len(which):
+        return kernels(half)
+    run = allowed.runs()
+    even = np.append(run[corner[:-1]] == run[corner[1:] - 1], False)
+    first = candidates(which, found.only(which), even[which])
+    near = _near(first, which[first], around.at, directions)
+    return _shaped(kernels(half), which, found.only(which), near)
 
 
-def _kernels(half: Array) -> Rounding:
-    """Kernels of half-widths (K,) m."""
-    one, none, steep = np.ones((2, len(half))), np.zeros((2, len(half))), 1 / half**2
-    step = steep * np.array([[[-1], [1]], [[2], [-2]], [[-1], [1]]])
-    inner = Inner(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros((2, 0)))
-    shaped = np.zeros(len(half), dtype=np.bool_)
-    return Rounding(np.stack((half, half)), none, one, one.copy(), step, shaped, inner)
+def _near(first: Ints, corner: Ints, at: Array, directions: list[Array]) -> Near:
+    """Pairs that ``corner`` (P,) and the next ones are."""
+    (before, after), length = directions, at[corner + 1] - at[corner]
+    moves = np.stack((before[corner], after[corner], after[corner + 1]))
+    return Near(first, moves.swapaxes(1, 2), length)
 
 
 def _beside(values: Array, corner: Ints, end: float) -> Array:
@@ -193,18 +173,26 @@ def _kernel_speed(half: Array, around: Corners) -> Array:
     return found
 
 
-def _shaped(found: Rounding, which: Ints, corners: Corners) -> Rounding:
-    """With shapes instead of those kernels that they are quicker than."""
-    around, half = corners.only(which), found.half[:, which]
+def _shaped(found: Rounding, which: Ints, around: Corners, near: Near) -> Rounding:
+    """With shapes instead of those kernels of corners ``which`` that they are quicker than."""
+    half, swings = found.half[:, which], _swings(which, around)
+    speed = np.minimum(_kernel_speed(half[0], around), around.feed.min(axis=0))
+    usual = time_around(around, 2 * half[0] / speed, np.stack((speed, speed)), half)
+    time = time_around(around, swings.duration.sum(axis=0), swings.speed, swings.reach)
+    pairs, ways = taken(around, near, np.minimum(usual, time))
+    quicker = time < usual
+    quicker[np.concatenate((pairs.first, pairs.first + 1))] = False
+    better = np.flatnonzero(quicker)
+    found = replace(found, inner=_replaced(found, which[better], swings.only(better)))
+    return put(found, which[pairs.first], pairs.length, ways)
+
+
+def _swings(which: Ints, around: Corners) -> Swings:
+    """Shapes of corners ``which``, each for itself."""
     swings = swung(around)
     met = np.minimum(around.feed, _met(swings.speed, which, around.shared))
     slower = np.flatnonzero((met * (1 + TIED) < swings.speed).any(axis=0))
-    swings = swings.replaced(slower, swung(replace(around, met=met).only(slower)))
-    speed = np.minimum(_kernel_speed(half[0], around), around.feed.min(axis=0))
-    usual = time_around(around, 2 * half[0] / speed, np.stack((speed, speed)), half)
-    quicker = time_around(around, swings.duration.sum(axis=0), swings.speed, swings.reach) < usual
-    better = np.flatnonzero(quicker)
-    return replace(found, inner=_replaced(found, which[better], swings.only(better)))
+    return swings.replaced(slower, swung(replace(around, met=met).only(slower)))
 
 
 def _met(speed: Array, which: Ints, shared: Flags) -> Array:
@@ -227,6 +215,7 @@ def _replaced(found: Rounding, which: Ints, swings: Swings) -> Inner:
     found.half[:, which] = length[:middle].sum(axis=0), length[middle:].sum(axis=0)
     found.saved[:, which] = found.half[:, which] - swings.reach
     found.gear[:, which], found.steep[:, which] = swings.speed / speed, swings.peak / speed
+    found.jump[:, which] = (found.gear[:, which] - 1.0) * np.array([[1.0], [-1.0]])
     step = np.diff(third, axis=1, prepend=0.0, append=0.0)
     found.step[:, :, which] = step[:, [0, middle, -1]].swapaxes(0, 1)
     found.shaped[which] = True

@@ -272,15 +272,15 @@ class LegPlanner:
         """m of path drawn before a place on which the path there depends, at speeds up to this.
 
         A corner whose rounding goes on there lies at most one room before. It depends on the corner before it
-        where they share a straight, two rooms more, and that on what lies beside it, as far again; a turn
-        depends on where points were moved, a corner on those in its row, and how wide a kernel is on the
-        turns around it.
+        where they share a straight, two rooms more, and that on what lies beside it, as far again, and once
+        more if both may be a pair; a turn depends on where points were moved, a corner on those in its row,
+        and how wide a kernel is on the turns around it.
         """
         limits = self._limits
         room = max(float(way(np.array(speed), limits.acceleration, limits.jerk)), 2 * limits.half_width)
         before = 2 * approach.reach(limits.half_width) + chords.reach(limits.half_width)
         before += 2 * corner.ROW * limits.half_width
-        return 5 * room + before
+        return 7 * room + before
 
     def _too_fast(self, speed: float) -> MotionError:
         assert self._segments is not None

@@ -25,12 +25,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cdhr_host.motion import chords
 from cdhr_host.motion.approach import Moved
 from cdhr_host.motion.beside import Allowance, Beside, beside
 from cdhr_host.motion.chords import Turns
-from cdhr_host.motion.corner import Rounding, Widths, open_rows, roundings, turns
+from cdhr_host.motion.corner import Widths, open_rows, roundings, turns
+from cdhr_host.motion.rounding import Rounding
 from cdhr_host.motion.vectors import norms
 from cdhr_host.values import Array, Flags, Ints
 
@@ -158,7 +160,7 @@ def smooth(
     borders = drawn[(spent > 0.0) | _changes(allowed, len(points))]
     widths = Widths(h, h - 3.0 * spent[corner], ends, borders, swings)
     single = turns(around, directions, widths)
-    rounding = roundings(single, around, corner, widths, allowed)
+    rounding = roundings(single, around, (corner, *directions), widths, allowed)
     saved = np.zeros((2, len(points)))
     saved[:, corner] = rounding.saved
     after = drawn + np.cumsum(saved.sum(axis=0))
@@ -286,21 +288,19 @@ def _knots(
 
     Pieces begin where a rounding does, where its q''' changes, at its end, and ``also`` elsewhere.
     """
-    inner, (before, after) = rounding.inner, rounding.half
-    exact = middle.astype(np.longdouble)
-    at = np.concatenate((exact - before, exact, exact + after, exact[inner.corner] + inner.at, also))
+    at = np.concatenate((*_places(middle, rounding), also))
     order = np.argsort(at, kind="stable")
     at = np.clip(at[order], also[-1], last)
     keep = np.diff(at, append=last) > 0
-    one, rest = np.ones(len(middle), np.int64), np.zeros(len(inner.at) + len(also), np.int64)
-    bending = np.cumsum(np.concatenate((one, 0 * one, -one, rest))[order])
+    one, rest = np.ones(len(middle), np.int64), np.zeros(len(at) - 3 * len(middle), np.int64)
+    bending = np.cumsum(np.concatenate((-one, one, 0 * one, rest))[order])
     third = _summed(_steps(turns, rounding, len(also))[order])
     third[bending == 0] = 0.0
     slope, gear, steep = np.zeros_like(third), np.zeros((2, len(at))), np.ones(len(at))
     if rounding.shaped.any():
         number = np.where(rounding.shaped, np.arange(1, len(middle) + 1), 0)
-        of = np.cumsum(np.concatenate((number, 0 * number, -number, rest))[order])
-        later = np.cumsum(np.concatenate((0 * number, number, -number, rest))[order])
+        of = np.cumsum(np.concatenate((-number, number, 0 * number, rest))[order])
+        later = np.cumsum(np.concatenate((-number, 0 * number, number, rest))[order])
         within = np.flatnonzero(of)
         gear[:, within] = rounding.gear[:, of[within] - 1]
         steep[within] = rounding.steep[(later[within] > 0).astype(np.int64), of[within] - 1]
@@ -310,19 +310,31 @@ def _knots(
     return at[keep].astype(np.float64), lengths, kinks
 
 
+def _places(middle: Array, rounding: Rounding) -> list[NDArray[np.longdouble]]:
+    """m in s of ends, begins and middles of K roundings, and of places within them; (K,) or (E,) each.
+
+    Ends come first: where one begins at the end of another it comes after that.
+    """
+    inner, spatial, exact = rounding.inner, rounding.spatial, middle.astype(np.longdouble)
+    begin, end = exact - rounding.half[0], exact + rounding.half[1]
+    later = np.flatnonzero(rounding.follows)
+    begin[later] = end[later - 1]
+    return [end, begin, exact, exact[inner.corner] + inner.at, exact[spatial.corner] + spatial.at]
+
+
 def _jumps(turns: tuple[Array, Array], rounding: Rounding, rest: int) -> Array:
-    """(E, 3): by how much q' jumps at begins, middles, ends, and at the ``rest``."""
-    (before, after), (first, final) = turns, rounding.gear[:, :, None]
-    return np.concatenate(((first - 1) * before, 0 * before, (1 - final) * after, np.zeros((rest, 3))))
+    """(E, 3): by how much q' jumps at ends, begins and middles, and at the ``rest``."""
+    (before, after), (first, final) = turns, rounding.jump[:, :, None]
+    return np.concatenate((final * after, first * before, 0 * before, np.zeros((rest, 3))))
 
 
 def _steps(turns: tuple[Array, Array], rounding: Rounding, also: int) -> Array:
-    """(E, 3) 1/m²: how much q''' changes at begins, middles, ends, between them, and ``also`` elsewhere."""
+    """(E, 3) 1/m²: how much q''' changes at ends, begins, middles, between them, and ``also`` elsewhere."""
     (before, after), inner = turns, rounding.inner
-    steps = [old[:, None] * before + new[:, None] * after for old, new in rounding.step]
+    begin, middle, end = (old[:, None] * before + new[:, None] * after for old, new in rounding.step)
     old, new = inner.step[:, :, None]
-    steps.append(old * before[inner.corner] + new * after[inner.corner])
-    return np.concatenate((*steps, np.zeros((also, 3))))
+    within = old * before[inner.corner] + new * after[inner.corner]
+    return np.concatenate((end, begin, middle, within, rounding.spatial.step, np.zeros((also, 3))))
 
 
 def _before(increments: Array) -> Array:

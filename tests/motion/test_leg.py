@@ -52,6 +52,26 @@ def sidesteps(rng):
     return np.column_stack((points, np.zeros(len(points)))), np.array(feeds)
 
 
+def hops(rng):
+    """Lines between right angles, up, down or to the side, at a few mm or far apart, at several feeds."""
+    points, feeds, heading, high = [np.zeros(3)], [], 0.0, False
+    for _ in range(rng.integers(4, 16)):
+        heading += rng.choice([0.0, math.pi / 2, math.pi, rng.uniform(-3, 3)])
+        ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
+        side = np.array([-ahead[1], ahead[0], 0.0])
+        lift = np.array([0.0, 0.0, -1.0 if high else 1.0])
+        high ^= bool(rng.uniform() < 0.6)
+        between = lift if (lift[2] < 0) != high else side
+        for way, length in (
+            (ahead, rng.uniform(3e-3, 0.06)),
+            (between, rng.choice([1e-3, 2.5e-3, 6e-3, 0.02])),
+        ):
+            points.append(points[-1] + length * way)
+            feeds.append(rng.choice([0.02, 0.03, 0.06, 0.1]))
+        heading += rng.choice([0.0, math.pi]) if between is side else 0.0
+    return np.array(points), np.array(feeds)
+
+
 def planned(points, feeds, size, factor=1.0):
     """Stretches, planned after every ``size`` moves with all feeds times a factor."""
     planner = Planner(LIMITS, points[0]).fork(FeedOverride(factor))
@@ -74,9 +94,9 @@ def path_of(legs, number, count=2000):
     return np.concatenate(parts), end
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(
-    st.sampled_from([program, sidesteps]),
+    st.sampled_from([program, sidesteps, hops]),
     st.integers(0, 10**6),
     st.sampled_from([(1, 1.0), (2, 3.0), (7, 1.7)]),
 )
