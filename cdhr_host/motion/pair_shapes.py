@@ -4,11 +4,10 @@ Pieces of constant jerk lead from a first straight over a second to a third, whi
 it. The table (``benchmarks/pair_shapes.py``) holds the fastest for some angles between the first and the
 third, some lengths between them and some speeds; one kind keeps the nozzle from going below the first
 straight, the other is flat. Its units are those in which acceleration and jerk are 1. What lies between the
-table's own is blended, and closed with as little jerk as possible: at the end no acceleration is left, and
-the nozzle is on the third straight and follows it.
+table's own is blended.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from itertools import product
@@ -23,6 +22,8 @@ PIECES = 8, 12, 8
 """before the first corner, between both, and after the second"""
 ENDS = PIECES[0], PIECES[0] + PIECES[1]
 """of which pieces the corners are"""
+FOLLOWS = np.concatenate((np.zeros(PIECES[0]), (np.arange(PIECES[1]) + 0.5) / PIECES[1], np.ones(PIECES[2])))
+"""Of a turn of the third straight, by how much each piece turns."""
 DIGITS = 9
 """Decimals of an angle that matter."""
 
@@ -87,7 +88,7 @@ def dot(a: Array, b: Array) -> Array:
     return np.asarray((a * b).sum(axis=-2), dtype=np.float64)
 
 
-def _norm(vectors: Array) -> Array:
+def norm(vectors: Array) -> Array:
     """(..., 3, K) -> (..., K)"""
     return np.asarray(np.sqrt(dot(vectors, vectors)), dtype=np.float64)
 
@@ -129,11 +130,21 @@ def blended(pairs: Pairs, unit: Array) -> Shapes:
     for corner in product((0, 1), repeat=len(axes)):
         sides = list(zip(corner, axes, strict=True))
         weight = np.prod([part if up else 1 - part for up, (_, part) in sides], axis=0)
-        mixed += weight[:, None] * rows[tuple(below + up for up, (below, _) in sides)]
+        at = tuple(below + up for up, (below, _) in sides)
+        mixed += weight[:, None] * _swivelled(rows[at], angle - turns[at[0]])
     mixed[(length < held.length[0]) | (length > held.length[-1])] = np.nan
     jerk = mixed[:, 4:].T.reshape(sum(PIECES), 3, -1) * j
     begun = np.clip(speed[0], held.speed[0], held.speed[-1]) * j * unit**2
     return Shapes(mixed[:, :3].T * unit, _turned(jerk, pairs), begun, mixed[:, 3] * j * unit**3)
+
+
+def _swivelled(rows: Array, angle: Array) -> Array:
+    """(K, 88) for a third straight turned by (K,) rad: the pieces on it as far, those between by parts."""
+    turn = np.outer(angle, FOLLOWS)
+    cosine, sine = np.cos(turn), np.sin(turn)
+    along, side, up = np.moveaxis(rows[:, 4:].reshape(len(rows), -1, 3), 2, 0)
+    jerk = np.stack((cosine * along - sine * side, sine * along + cosine * side, up), axis=2)
+    return np.concatenate((rows[:, :4], jerk.reshape(len(rows), -1)), axis=1)
 
 
 def _between(nodes: Array, values: Array) -> tuple[Ints, Array]:
@@ -146,36 +157,7 @@ def _turned(jerk: Array, pairs: Pairs) -> Array:
     """(28, 3, K) along the first straight, across it and along the second -> by axes."""
     before, up, after = pairs.direction
     along = before - dot(before, up) * up
-    along = along / _norm(along)
+    along = along / norm(along)
     left = np.cross(up, along, axis=0)
     side = np.where(dot(left, after) < 0.0, -left, left)
     return np.asarray(jerk[:, [0]] * along + jerk[:, [1]] * side + jerk[:, [2]] * up, dtype=np.float64)
-
-
-def closed(shapes: Shapes, pairs: Pairs) -> Shapes:
-    """With the least jerk more that leaves no acceleration at the end, and leads onto the third straight.
-
-    The square of that jerk is least, and none of it along the second straight acts before the first corner:
-    what is not to be below the first straight is not by that.
-    """
-    before, up, after = pairs.direction
-    across = up - dot(up, after) * after
-    across = across / _norm(across)
-    jerk, t = shapes.jerk, shapes.pieces
-    left = t.sum(axis=0) - np.cumsum(t, axis=0)
-    rows = np.stack((t, t * left + t**2 / 2, t * left**2 / 2 + t**2 * left / 2 + t**3 / 6))
-    late = np.repeat([0.0, 1.0, 1.0], PIECES)[:, None] / t
-    for axis, gain in ((across, late), (np.cross(after, across, axis=0), 1 / t)):
-        begin, reach = shapes.speed * dot(before, axis), shapes.reach * dot(before, axis)
-        end = np.stack((0.0 * begin, -begin, pairs.length * dot(up, axis) + reach - begin * t.sum(axis=0)))
-        missing = end - (rows * dot(jerk, axis)).sum(axis=1)
-        jerk = jerk + _least(rows, gain, missing)[:, None] * axis
-    brake = (t * dot(jerk, after)).sum(axis=0) / t.sum(axis=0)
-    return replace(shapes, jerk=jerk - brake * after)
-
-
-def _least(rows: Array, gain: Array, missing: Array) -> Array:
-    """(28, K) x with rows (3, 28, K) x = missing (3, K) and the least sum of x²/gain."""
-    square = np.einsum("ink,nk,jnk->kij", rows, gain, rows)
-    found = np.linalg.solve(square, missing.T[:, :, None])[:, :, 0]
-    return np.asarray(gain * np.einsum("ink,ki->nk", rows, found), dtype=np.float64)

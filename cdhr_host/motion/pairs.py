@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdhr_host.motion.pair_shapes import ENDS, PIECES, Pairs, Shapes, angles, blended, closed, dot
+from cdhr_host.motion.mended import closed, nearer
+from cdhr_host.motion.pair_shapes import ENDS, PIECES, Pairs, Shapes, angles, blended, dot, norm
 from cdhr_host.values import Array, Ints
 
 PARTS = 3
@@ -21,15 +22,21 @@ RIGHT = 0.005
 """Cosine up to which an angle is a right one, and sine up to which a pair is flat."""
 TOLERANCE = 0.05
 """that the table's shapes make use of, in its units"""
-UNITS = (1.01, 1.0, 0.985, 0.96, 0.93, 0.88, 0.8)
+UNITS = (1.02, 1.01, 1.0, 0.993, 0.985, 0.975, 0.96, 0.93, 0.9, 0.84)
 """Units of time that are tried: the longer, the further off the nozzle may be."""
 INSIDE = 5e-7
 """m below the first straight, where that is not allowed: the table's rounding"""
 ALIKE = 0.01, 0.002, 0.02
 """rad between directions, and parts between lengths and between rooms, of pairs that get the same unit,"""
-SPARE = 0.995
+SPARE = 0.997
 """which is for so much of the tolerance, since they are not quite the same"""
-TOGETHER = 64
+MENDED = 2
+"""times that a shape is taken nearer to what is drawn, to this part of the tolerance"""
+TARGET = 0.99
+TINY = np.finfo(float).tiny
+LESS = 0.99, 0.97, 0.94
+"""Of a kind's unit, what is tried for a pair that leaves the tolerance with it."""
+TOGETHER = 256
 """Pairs looked at together, so that memory stays small."""
 
 
@@ -104,17 +111,17 @@ def _either_way(pairs: Pairs) -> Ways:
     return _soonest(pairs)
 
 
-def _norm(vectors: Array) -> Array:
-    """(..., 3, K) -> (..., K)"""
-    return np.asarray(np.sqrt(dot(vectors, vectors)), dtype=np.float64)
-
-
 def _soonest(pairs: Pairs) -> Ways:
     """Of pairs of one kind, that do not fall."""
     kinds, kind = _kinds(pairs)
-    unit = np.concatenate([_unit(kinds.only(some)) for some in _batches(len(kinds.length))])
-    found = [_way(pairs.only(some), unit[kind[some]]) for some in _batches(len(kind))]
-    return found[0].joined(found[1:])
+    unit = np.concatenate([_unit(kinds.only(some)) for some in _batches(len(kinds.length))])[kind]
+    found = [_way(pairs.only(some), unit[some]) for some in _batches(len(kind))]
+    ways = found[0].joined(found[1:])
+    for part in LESS:  # a pair is not quite of its kind
+        missed = np.flatnonzero(~np.isfinite(ways.duration[0]))
+        if len(missed):
+            ways = ways.replaced(missed, _way(pairs.only(missed), part * unit[missed]))
+    return ways
 
 
 def _batches(count: int) -> list[Ints]:
@@ -122,7 +129,31 @@ def _batches(count: int) -> list[Ints]:
 
 
 def _way(pairs: Pairs, unit: Array) -> Ways:
-    return _measured(closed(blended(pairs, unit), pairs), pairs)
+    """With the shape that each unit (K,) s of the table gives."""
+    shapes = closed(blended(pairs, unit), pairs)
+    for _ in range(MENDED):
+        shapes = nearer(shapes, pairs, *_farthest(shapes, pairs))
+    return _measured(shapes, pairs)
+
+
+def _farthest(shapes: Shapes, pairs: Pairs) -> tuple[Array, Array]:
+    """Times (5, K) s, and by how much (5, 3, K) m the nozzle is too far off then.
+
+    At both corners, and where it is farthest before, between and after them.
+    """
+    part = np.repeat(shapes.pieces / PARTS, PARTS, axis=0)
+    place, _, _ = _run(np.repeat(shapes.jerk, PARTS, axis=0), part, shapes, pairs)
+    time = np.concatenate((0 * part[:1], np.cumsum(part, axis=0)))
+    first, second = (PARTS * each for each in ENDS)
+    cuts = 1, first, first + 1, second, second + 1, len(part)
+    _, before, one, between, two, after, _ = np.split(place, cuts)
+    before, between, after = _away((before, between, after), pairs)
+    away = before, one, between, two - pairs.length * pairs.direction[1], after
+    far = [np.argmax(norm(each), axis=0) for each in away]
+    at = np.stack([time[cut + k, range(len(k))] for cut, k in zip(cuts, far, strict=False)])
+    off = np.stack([each[k, :, range(len(k))].T for each, k in zip(away, far, strict=True)])
+    size = norm(off)
+    return at, off * (np.maximum(1 - TARGET * pairs.off / np.maximum(size, TINY), 0.0))[:, None]
 
 
 def _kinds(pairs: Pairs) -> tuple[Pairs, Ints]:
@@ -147,7 +178,7 @@ def _unit(pairs: Pairs) -> Array:
     ways, feed = _way(tried, units.ravel()), tried.feed[outer]
     left = np.maximum(tried.room - ways.reach, 0.0) + (feed - ways.speed) ** 2 / tried.limits[0] / 2
     time = ways.duration.sum(axis=0) + (left / feed).sum(axis=0)
-    best = np.argmin(time.reshape(count, -1), axis=1)
+    best = np.argmin(np.where(np.isfinite(time), time, np.inf).reshape(count, -1), axis=1)
     return np.asarray(units[np.arange(count), best], dtype=np.float64)
 
 
@@ -157,8 +188,8 @@ def _measured(shapes: Shapes, pairs: Pairs) -> Ways:
     place, speed, bend = _run(np.repeat(shapes.jerk, PARTS, axis=0), part, shapes, pairs)
     hull, fast = _hull(place, speed, bend, part)
     (a, j), straight = pairs.limits, np.repeat(np.arange(3), np.array(PIECES) * PARTS)
-    peak = np.stack([_norm(fast[:, straight == side]).max(axis=(0, 1)) for side in range(3)])
-    hard = np.cbrt(_norm(shapes.jerk).max(axis=0) / j), np.sqrt(_norm(bend).max(axis=0) / a)
+    peak = np.stack([norm(fast[:, straight == side]).max(axis=(0, 1)) for side in range(3)])
+    hard = np.cbrt(norm(shapes.jerk).max(axis=0) / j), np.sqrt(norm(bend).max(axis=0) / a)
     slower = np.max((*hard, *(peak / pairs.feed)), axis=0)
     after = pairs.direction[2]
     end = np.stack((shapes.speed, dot(speed[-1], after)))
@@ -172,13 +203,16 @@ def _measured(shapes: Shapes, pairs: Pairs) -> Ways:
 
 def _run(jerk: Array, part: Array, shapes: Shapes, pairs: Pairs) -> tuple[Array, Array, Array]:
     """(N + 1, 3, K) places, speeds and accelerations at the ends of N parts; the first corner is at 0."""
-    place, speed, bend = (np.zeros((len(part) + 1, *jerk.shape[1:])) for _ in range(3))
-    place[0], speed[0] = -shapes.reach * pairs.direction[0], shapes.speed * pairs.direction[0]
-    for k, (j, t) in enumerate(zip(jerk, part, strict=True)):
-        bend[k + 1] = bend[k] + t * j
-        speed[k + 1] = speed[k] + t * (bend[k] + t * j / 2)
-        place[k + 1] = place[k] + t * (speed[k] + t * (bend[k] / 2 + t * j / 6))
+    t, before = part[:, None], pairs.direction[0]
+    bend = _sums(0.0 * before, t * jerk)
+    speed = _sums(shapes.speed * before, t * (bend[:-1] + t * jerk / 2))
+    place = _sums(-shapes.reach * before, t * (speed[:-1] + t * (bend[:-1] / 2 + t * jerk / 6)))
     return place, speed, bend
+
+
+def _sums(begin: Array, steps: Array) -> Array:
+    """(3, K), (N, 3, K) -> (N + 1, 3, K)"""
+    return np.cumsum(np.concatenate((begin[None], steps)), axis=0)
 
 
 def _hull(place: Array, speed: Array, bend: Array, part: Array) -> tuple[Array, Array]:
@@ -193,15 +227,20 @@ def _hull(place: Array, speed: Array, bend: Array, part: Array) -> tuple[Array, 
 
 def _off(hull: Array, place: Array, pairs: Pairs) -> Array:
     """(K,) m: greatest distance from the straight each part belongs to, and of corners from their points."""
-    before, up, after = pairs.direction
     first, second = (PARTS * each for each in ENDS)
-    corner = pairs.length * up
-    along = np.minimum(dot(hull[:, :first], before), 0.0)
-    way = hull[:, :first] - along[:, :, None] * before
-    along = np.clip(dot(hull[:, first:second], up), 0.0, pairs.length)
-    over = hull[:, first:second] - along[:, :, None] * up
-    away = hull[:, second:] - corner
-    away = away - np.maximum(dot(away, after), 0.0)[:, :, None] * after
-    points = [_norm(place[first]), _norm(place[second] - corner)]
-    points.extend(_norm(each).max(axis=(0, 1)) for each in (way, over, away))
+    away = _away((hull[:, :first], hull[:, first:second], hull[:, second:]), pairs)
+    points = [norm(place[first]), norm(place[second] - pairs.length * pairs.direction[1])]
+    points.extend(norm(each).max(axis=(0, 1)) for each in away)
     return np.asarray(np.max(points, axis=0), dtype=np.float64)
+
+
+def _away(places: tuple[Array, Array, Array], pairs: Pairs) -> tuple[Array, Array, Array]:
+    """Places (..., 3, K) before, between and after both corners -> from what is drawn there to them."""
+    (one, between, two), (before, up, after) = places, pairs.direction
+    beyond = two - pairs.length * up
+    along = np.minimum(dot(one, before), 0.0), np.clip(dot(between, up), 0.0, pairs.length)
+    return (
+        one - along[0][..., None, :] * before,
+        between - along[1][..., None, :] * up,
+        beyond - np.maximum(dot(beyond, after), 0.0)[..., None, :] * after,
+    )

@@ -46,9 +46,9 @@ def path_of(points, feeds):
 
 
 def is_pair(path):
-    """Whether all its shapes are one."""
+    """Whether all its shapes are one, over three segments."""
     shaped = np.flatnonzero(path.gear[0])
-    return len(shaped) == sum(PIECES) and (np.diff(shaped) == 1).all()
+    return len(set(path.segment[shaped])) > 2 and (np.diff(shaped) == 1).all()
 
 
 def duration(points, feeds):
@@ -56,42 +56,49 @@ def duration(points, feeds):
     return sum(leg.duration for leg in [*planner.stretches(moves(points, feeds)), *planner.close()])
 
 
+def rates(leg, step=2e-4):
+    """Places (N, 3) m, and m/s, m/s² and m/s³ by the chain rule; the piece of each."""
+    t = np.arange(0.0, leg.duration, step)
+    s, v, a = leg.law.at(t)
+    j = leg.law.state[3, np.searchsorted(leg.law.t, t, side="right") - 1][:, None]
+    piece, place, slope, bend = leg.path.at(s)
+    third, v, a = leg.path.coefficients[3][:, piece].T, v[:, None], a[:, None]
+    jerk = third * v**3 + 3 * bend * v * a + slope * j
+    return piece, place, (slope * v, bend * v**2 + slope * a, jerk)
+
+
 def look(points, feeds):
-    """Checks a path at the speed at which jerk is at its limit; whether it is a pair."""
-    path = path_of(points, feeds)
-    if not is_pair(path):
-        return False
-    shaped = np.flatnonzero(path.gear[0])
-    v = np.cbrt(J / norm(path.coefficients[3][:, shaped].T).max())
-    v = min(v, (np.array(feeds)[path.segment[shaped]] / path.steep[shaped]).min())
-    end = path.start[shaped[-1]] + path.lengths()[shaped[-1]]
-    s = np.linspace(path.start[shaped[0]] + 1e-12, end - 1e-12, 3000)
-    piece, place, slope, curve = path.at(s)
-    assert (norm(slope) <= path.steep[piece] * (1 + 1e-9)).all()
-    assert path.steep.max() <= 1 + 1e-12
-    assert norm(curve).max() * v**2 <= A * (1 + 1e-6)
+    """Plans a program of one leg and checks it; whether it has a pair."""
+    planner = Planner(LIMITS, points[0])
+    (leg,) = [*planner.stretches(moves(points, feeds)), *planner.close()]
+    piece, place, (speed, change, jerk) = rates(leg)
+    allowed = np.minimum(np.array(feeds)[leg.path.segment[piece]], LIMITS.speed)
+    assert (norm(speed) <= allowed * (1 + 1e-6)).all()
+    assert norm(change).max() <= A * (1 + 1e-6)
+    assert norm(jerk).max() <= J * (1 + 1e-6)
     assert distance_to(place, points).max() <= TOLERANCE
     for corner in points[1:3]:
-        assert norm(place - corner).min() <= TOLERANCE
+        assert norm(place - corner).min() <= TOLERANCE + 1e-5
     assert place[:, 2].min() >= points[:, 2].min() - INSIDE
-    return True
+    assert leg.path.steep.max() <= 1 + 1e-12
+    return is_pair(leg.path)
 
 
 @given(TURN, SHORT, LONG, FEEDS, st.booleans())
-@settings(max_examples=150)
+@settings(max_examples=150, deadline=None)
 def test_a_hop_keeps_limits_feeds_and_tolerance_and_stays_above(degrees, length, beside, feeds, falls):
     look(hop(degrees, length, beside, falls=falls), feeds[::-1] if falls else feeds)
 
 
 @given(SHORT, LONG, FEEDS, st.booleans(), st.floats(0, 360))
-@settings(max_examples=100)
+@settings(max_examples=100, deadline=None)
 def test_the_end_of_a_line_keeps_limits_feeds_and_tolerance(length, beside, feeds, back, heading):
     look(bend(length, beside, back=back, heading=heading), feeds)
 
 
 @pytest.mark.parametrize("falls", [False, True])
 @pytest.mark.parametrize("degrees", [0, 42, 90, 137, 180])
-@pytest.mark.parametrize("length", [1.2e-3, 2.5e-3, 5e-3, 7.5e-3])
+@pytest.mark.parametrize("length", [2.5e-3, 4e-3, 5e-3, 7.5e-3])
 def test_hops_of_slicers_are_pairs(degrees, length, falls):
     feeds = (0.06, 0.06, 0.03) if falls else (0.03, 0.06, 0.06)
     assert look(hop(degrees, length, falls=falls), feeds)
@@ -104,7 +111,7 @@ def test_ends_of_lines_of_infill_are_pairs(length, back):
 
 
 @given(TURN, SHORT, LONG, FEEDS, st.booleans())
-@settings(max_examples=60)
+@settings(max_examples=60, deadline=None)
 def test_the_path_joins_its_straights_in_place_and_direction(degrees, length, beside, feeds, falls):
     points = hop(degrees, length, beside, falls=falls)
     path = path_of(points, feeds)
@@ -128,7 +135,7 @@ def test_a_pair_the_other_way_round_is_the_same_backwards():
 
 
 @pytest.mark.parametrize(
-    ("degrees", "gain"), [(0, 5e-3), (42, 9e-3), (90, 20e-3), (138, 30e-3), (180, 30e-3)]
+    ("degrees", "gain"), [(0, 10e-3), (42, 15e-3), (90, 30e-3), (138, 35e-3), (180, 30e-3)]
 )
 def test_a_pair_is_sooner_than_two_corners(degrees, gain, monkeypatch):
     points, feeds = hop(degrees, 2.5e-3), np.array([0.03, 0.06, 0.06])
