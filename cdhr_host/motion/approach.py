@@ -16,11 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cdhr_host.motion.beside import SHARP
 from cdhr_host.motion.vectors import norms, units
 from cdhr_host.values import Array, Flags, Ints
 
-SHARP = 0.25
-"""Change of direction from which a corner needs a straight, about 14°."""
 REACH = 6.0
 """half-widths, how far from the corner points are moved"""
 FARTHEST = 12.0

@@ -1,8 +1,8 @@
 """How far the rounding of each corner may reach along the straights beside it.
 
 A corner needs little more than the way from its feed to rest. Where a straight is long enough, both its
-corners have what they need; else they share it evenly. So a corner's room depends on no more of the path
-than twice that. A straight goes on over points that are no corners. Where the feed changes on it nearer to a
+corners have what they need; else they share it evenly, unless one of them is a gentle turn that has no use for
+it. So a corner's room depends on no more of the path than twice that. A straight goes on over points that are no corners. Where the feed changes on it nearer to a
 corner than what that can make use of, the corner keeps to the lower of both feeds, up to the next change.
 """
 
@@ -14,6 +14,8 @@ from cdhr_host.values import Array, Flags, Ints
 
 SWING = 1.6
 """Ways from the feed to rest that a corner can make use of: it slows down more gently where it swings out."""
+SHARP = 0.25
+"""Change of direction from which a corner needs a straight, about 14°."""
 APART = 1 - 1e-6
 """Of each share, so that between two corners there is always a straight."""
 
@@ -116,8 +118,11 @@ class Beside:
         return edge - max(self.least, onward)
 
 
-def beside(drawn: Array, corner: Ints, *, least: float, allowed: Allowance | None) -> Beside:
-    """Of the corners at points ``corner`` (K,) of a polyline; ``drawn`` (M+1,) m is how far along each is."""
+def beside(drawn: Array, corner: Ints, turn: Array, *, least: float, allowed: Allowance | None) -> Beside:
+    """Of the corners at points ``corner`` (K,) of a polyline, that turn by (K,).
+
+    ``drawn`` (M+1,) m is how far along each point is.
+    """
     at, count = drawn[corner], len(drawn) - 1
     allowed = allowed or Allowance(np.full(count, BOUNDLESS), np.ones(count), 1.0, 1.0)
     ways = np.maximum(allowed.ways(), 2 * least)
@@ -126,9 +131,23 @@ def beside(drawn: Array, corner: Ints, *, least: float, allowed: Allowance | Non
     needed = np.minimum(used, np.maximum(pace.even, 2 * least))
     between = np.diff(at, prepend=drawn[0], append=drawn[-1])
     both = np.concatenate((ways[:1], needed[1])), np.concatenate((needed[0], ways[-1:]))
-    room, short = _rooms(between, both, least), between < both[0] + both[1]
+    short = between < both[0] + both[1]
+    room = _rooms(between, _yielding(both, turn, pace.feed.max(axis=0), 2 * least, allowed), least)
     shared = np.stack((short[:-1], short[1:]))
     return Beside(at, needed, room, pace.within(room), shared, ways, least)
+
+
+def _yielding(
+    needed: tuple[Array, Array], turn: Array, feed: Array, least: float, allowed: Allowance
+) -> tuple[Array, Array]:
+    """What both ends of each straight need: a gentle turn leaves to a sharp corner what it has no use for."""
+    kernel = np.maximum(np.sqrt(turn * feed**3 / allowed.jerk), turn * feed**2 / allowed.acceleration)
+    gentle, sharp = (turn < SHARP) & (kernel <= least / 2), turn >= SHARP
+    left, right = needed[0].copy(), needed[1].copy()
+    before, after = np.flatnonzero(gentle[:-1] & sharp[1:]) + 1, np.flatnonzero(sharp[:-1] & gentle[1:]) + 1
+    left[before] = np.minimum(left[before], least)
+    right[after] = np.minimum(right[after], least)
+    return left, right
 
 
 def _rooms(between: Array, needed: tuple[Array, Array], least: float) -> Array:

@@ -20,8 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cdhr_host.motion.approach import SHARP
-from cdhr_host.motion.beside import Allowance
+from cdhr_host.motion.beside import SHARP, Allowance
 from cdhr_host.values import Array, Flags, Ints
 
 HELD_UP = 1.5

@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cdhr_host.motion.approach import SHARP
-from cdhr_host.motion.beside import Allowance, Beside
+from cdhr_host.motion.beside import SHARP, Allowance, Beside
 from cdhr_host.motion.chords import Turns, widened
 from cdhr_host.motion.paired import Near, candidates, put, taken
 from cdhr_host.motion.rounding import Inner, Rounding, kernels

@@ -154,7 +154,7 @@ def smooth(
     corner, directions = _corners(direction)
     ends = np.stack((passed + drawn[corner], (drawn[-1] if closes else math.inf) - drawn[corner]))
     turn = norms(directions[1] - directions[0])
-    around = beside(drawn, corner, least=h, allowed=allowed)
+    around = beside(drawn, corner, turn, least=h, allowed=allowed)
     spent = np.zeros(len(points)) if moved is None else moved.spent
     swings = (directions[1] - directions[0])[:, 2] <= LEVEL * turn
     borders = drawn[(spent > 0.0) | _changes(allowed, len(points))]
