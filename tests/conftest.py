@@ -4,20 +4,36 @@ import atexit
 import os
 import shutil
 import tempfile
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
+from coverage import Coverage
+from hypothesis import HealthCheck, settings
 
 STATE = tempfile.mkdtemp(prefix="cdhr-tests-")
 os.environ["XDG_STATE_HOME"] = STATE
 atexit.register(shutil.rmtree, STATE, ignore_errors=True)
+settings.register_profile("busy", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("busy")  # how busy the computer is meanwhile says nothing about an example
 HERE = Path(__file__).parent
 TRACED = {"program", "mechanism", "motion", "extrusion", "control", "plant", "samples", "pipeline", "laws"}
 """the pure rooms' own tests, of which a share of covered lines is asked; tracing would slow others down"""
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Leave coverage to the tests that it is asked of."""
-    for item in items:
-        if item.path.relative_to(HERE).parts[0] not in TRACED:
-            item.add_marker("no_cover")
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """Leave coverage to the tests that it is asked of.
+
+    What other tests set up is not traced either. A process of pytest-xdist traces twice, one under the
+    other (its own and that of its parent's arguments): both are stopped, or nothing is won.
+    """
+    stopped: list[Coverage] = []
+    while item.path.relative_to(HERE).parts[0] not in TRACED and (tracing := Coverage.current()):
+        tracing.stop()
+        stopped.append(tracing)
+    try:
+        return (yield)
+    finally:
+        for tracing in reversed(stopped):
+            tracing.start()
