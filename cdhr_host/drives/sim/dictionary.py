@@ -4,6 +4,7 @@ import configparser
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from importlib import resources
 from typing import Final
 
@@ -93,20 +94,26 @@ class Dictionary:
 
 
 def _entries(eds: str, node_id: int) -> dict[Key, Entry]:
+    return {
+        key: Entry(kind, access, text if kind == TEXT else _number(text, node_id))
+        for key, kind, access, text in _variables(eds)
+    }
+
+
+@cache
+def _variables(eds: str) -> tuple[tuple[Key, int, str, str], ...]:
+    """Key, type, access and default of each; six drives are described by one file."""
     parser = configparser.ConfigParser(interpolation=None)
     parser.read_string(resources.files("cdhr_host.drives").joinpath("eds", eds).read_text(encoding="utf-8"))
-    found: dict[Key, Entry] = {}
+    found = []
     for name in parser.sections():
         index, _, sub = name.partition("sub")
-        if len(index) != 4 or "DataType" not in parser[name]:
-            continue
         section = parser[name]
-        kind = int(section["DataType"], 16)
-        text = section["DefaultValue"]
-        found[int(index, 16), int(sub or "0", 16)] = Entry(
-            kind, section["AccessType"], text if kind == TEXT else _number(text, node_id)
-        )
-    return found
+        if len(index) != 4 or "DataType" not in section:
+            continue
+        key = (int(index, 16), int(sub or "0", 16))
+        found.append((key, int(section["DataType"], 16), section["AccessType"], section["DefaultValue"]))
+    return tuple(found)
 
 
 def _number(text: str, node_id: int) -> int:

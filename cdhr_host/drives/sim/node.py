@@ -173,12 +173,12 @@ class Node:
 
     def _timers(self, now: float) -> None:
         for pdo in self.rpdos:
-            if pdo.event and pdo.heard is not None and now - pdo.heard > pdo.event + 1e-9:
+            if pdo.heard is not None and (event := pdo.event) and now - pdo.heard > event + 1e-9:
                 pdo.heard = None
                 self.emergency(0x8250)
                 self.setpoints_lost()
         for pdo in self.tpdos:
-            if pdo.cob and pdo.type >= 254 and pdo.event and now - pdo.sent >= pdo.event:
+            if pdo.type >= 254 and pdo.cob and (event := pdo.event) and now - pdo.sent >= event:
                 pdo.sent = now
                 self._send(pdo)
 

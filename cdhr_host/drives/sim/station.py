@@ -105,20 +105,23 @@ class Station:
 
     def exchange(self, now: float, frames: Iterable[Frame]) -> list[Frame]:
         """Frames from the host -> frames to it, by the time ``now``."""
+        nodes = self.nodes
         for cob, data in chain.from_iterable(map(self.inbound, frames)):
             if cob == SYNC:
                 self._sync(now, data)
             else:
-                for node in self.nodes:
+                for node in nodes:
                     node.receive(now, cob, data)
         judged = now - self._grace
-        for node in self.nodes:
+        for node in nodes:
             node.tick(judged)
         while judged - self._stepped > 2.5 * self.period:
             self._coast(judged)
-        sent = [frame for node in self.nodes for frame in node.outbox]
-        for node in self.nodes:
-            node.outbox.clear()
+        sent: list[Frame] = []
+        for node in nodes:
+            if node.outbox:
+                sent += node.outbox
+                node.outbox.clear()
         return list(chain.from_iterable(map(self.outbound, sent)))
 
     def _sync(self, now: float, data: bytes) -> None:
