@@ -35,12 +35,12 @@ class Hands:
     def messages(self) -> str:
         return "\n".join(strip.text for strip in self.desk.query_one(RichLog).lines)
 
-    async def until(self, happened: Callable[[], bool]) -> None:
+    async def until(self, happened: Callable[[], bool], *, every: float = 0.02) -> None:
         loop = asyncio.get_running_loop()
         given_up = loop.time() + PATIENCE
         while not happened():
             assert loop.time() < given_up, f"{self.text('job')}\n{self.messages}"
-            await self.pilot.pause(0.02)
+            await self.pilot.pause(every)
 
     async def type(self, text: str) -> None:
         await self.press("colon", *text, "enter")

@@ -1,7 +1,7 @@
 """The desk under an operator's fingers, over a real printer on simulated drives."""
 
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, chdir
 from pathlib import Path
 
 import pytest
@@ -15,7 +15,9 @@ from cdhr_host.job.surface import JobState
 from cdhr_host.pipeline import open_profile
 from cdhr_host.units import MM
 
-RING = Path(__file__).parents[2] / "gcode" / "paper_ring_double.gcode"
+RING = Path("r")
+"""what is typed for it: after each letter a pilot waits until the process idles, up to a second"""
+FILE = Path(__file__).parents[2] / "gcode" / "paper_ring_double.gcode"
 SPEED = 10.0
 """times real time: slow enough for a hand to come in between"""
 
@@ -50,7 +52,9 @@ def scenario(body: Callable[[Hands], Awaitable[None]]) -> Callable[[Path], None]
             async with hands(tmp_path) as hand:
                 await body(hand)
 
-        run(whole())
+        (tmp_path / RING).symlink_to(FILE)
+        with chdir(tmp_path):
+            run(whole())
 
     test.__doc__ = body.__doc__
     return test
@@ -58,7 +62,7 @@ def scenario(body: Callable[[Hands], Awaitable[None]]) -> Callable[[Path], None]
 
 @scenario
 async def test_forces_are_shown_before_anything_moves(hand: Hands) -> None:
-    assert "1L├··█·······┤  2.41  0.5–10.0" in hand.text("cables")
+    await hand.until(lambda: "1L├··█·······┤  2.41  0.5–10.0" in hand.text("cables"))
     assert " 8.77  5.0–12.0" in hand.text("cables")
 
 
@@ -106,9 +110,10 @@ async def test_history_comes_back(hand: Hands) -> None:
 @scenario
 async def test_a_word_completes(hand: Hands) -> None:
     await hand.press("colon", *"g2")
-    await hand.pilot.pause(0.1)
+    entry = hand.desk.query_one("#entry")
+    await hand.until(lambda: entry._suggestion == "G2")
     await hand.press("right")
-    assert hand.desk.query_one("#entry").value == "G2"
+    await hand.until(lambda: entry.value == "G2")
     await hand.press("escape", "right")
     await hand.until(lambda: place(hand) == [1, 0, 0])
 
@@ -163,12 +168,13 @@ async def test_a_file_that_cannot_be_printed_says_why(hand: Hands) -> None:
 @scenario
 async def test_the_keys_are_shown_and_hidden(hand: Hands) -> None:
     await hand.press("question_mark")
-    assert len(hand.desk.screen_stack) == 2
+    await hand.until(lambda: len(hand.desk.screen_stack) == 2)
+    await hand.pilot.pause()
     table = hand.desk.screen.query_one(Static).region
     assert table.right <= 80
     assert table.bottom <= 24
     await hand.press("right")
-    assert len(hand.desk.screen_stack) == 1
+    await hand.until(lambda: len(hand.desk.screen_stack) == 1)
     assert place(hand) == [0, 0, 0]
 
 
@@ -176,7 +182,7 @@ async def test_the_keys_are_shown_and_hidden(hand: Hands) -> None:
 def test_everything_is_on_the_screen(tmp_path: Path, size: tuple[int, int]) -> None:
     async def whole() -> None:
         async with hands(tmp_path, size=size) as hand:
-            await hand.pilot.pause(0.2)
+            await hand.until(lambda: len(hand.text("sliders").splitlines()) == 7)
             for name in ("job", "positions", "sliders", "cables", "air", "messages", "typing"):
                 area = hand.desk.query_one(f"#{name}").region
                 assert area.height > 0

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hands import Hands, run
 from stepped import Stepped
-from textual.events import AppBlur
+from textual.events import AppBlur, Key
 
 from cdhr_host.console.desk import Desk
 from cdhr_host.drives import Loopback
@@ -40,6 +40,8 @@ class Bench(Hands):
     clock: Stepped
     renewed: float
     """s of the clock, of the last press"""
+    jogs: int = 0
+    """times the printer was told to jog"""
 
     def go(self, duration: float) -> None:
         end = self.clock.now() + duration
@@ -49,12 +51,27 @@ class Bench(Hands):
         self.printer.turn()
 
     async def held(self, key: str, duration: float) -> None:
-        """A key is held: it repeats itself."""
+        """A key is held: it repeats itself.
+
+        A pilot's key press takes until the whole process idles; here it takes until the printer was told.
+        """
         end = self.clock.now() + duration
         while self.clock.now() < end - CLOSE:
-            await self.press(key)
+            before = self.jogs
+            self.desk.post_message(Key(key, None))
+            await self.until(lambda before=before: self.jogs > before, every=0.0)
             self.renewed = self.clock.now()
             self.go(REPEAT)
+
+    def count(self) -> None:
+        """Count what the printer is told."""
+        jog = self.printer.jog
+
+        def counted(velocity: np.ndarray) -> None:
+            self.jogs += 1
+            jog(velocity)
+
+        self.printer.jog = counted
 
     @property
     def done(self) -> Setpoints:
@@ -104,6 +121,7 @@ def bench(body: Callable[[Bench], Awaitable[None]]) -> Callable[[Path], None]:
                 async with desk.run_test(size=(80, 24)) as pilot:
                     hand = Bench(pilot, printer)
                     hand.rows, hand.clock = rows, clock
+                    hand.count()
                     await pilot.press("c", "plus")
                     await body(hand)
             finally:
