@@ -23,7 +23,7 @@ def url(request):
     assert select.select([far.stdout], [], [], 60.0)[0]
     yield far.stdout.readline().strip()
     far.send_signal(signal.SIGTERM)
-    far.wait(20.0)
+    far.wait(60.0)
     far.stdout.close()
 
 

@@ -43,13 +43,13 @@ class Far:
         self.record = folder / "received.csv"
         arguments = [sys.executable, "-m", "cdhr_host", "sim", "--record", str(self.record)]
         self.process = subprocess.Popen(arguments, cwd=ROOT, stdout=subprocess.PIPE, text=True)
-        assert select.select([self.process.stdout], [], [], 30.0)[0]
+        assert select.select([self.process.stdout], [], [], 90.0)[0]
         self.url = self.process.stdout.readline().strip()
 
     def end(self, how=signal.SIGTERM):
         if self.process.poll() is None:
             self.process.send_signal(how)
-        self.process.wait(20.0)
+        self.process.wait(60.0)
         self.process.stdout.close()
         path = self.record.with_suffix(".json")
         return json.loads(path.read_text()) if path.exists() else {}
@@ -72,7 +72,7 @@ def running(tmp_path):
         far.end()
 
 
-def _until(done, patience=20.0):
+def _until(done, patience=60.0):
     end = time.monotonic() + patience
     while time.monotonic() < end:
         if done():
@@ -325,7 +325,7 @@ def test_host_that_dies_leaves_the_machine_at_rest(tmp_path):
     path.write_text(script)
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     host = subprocess.Popen([sys.executable, str(path)], stdout=subprocess.PIPE, env=environment)
-    assert select.select([host.stdout], [], [], 30.0)[0]
+    assert select.select([host.stdout], [], [], 90.0)[0]
     sender = int(host.stdout.readline())
     time.sleep(0.5)
     host.kill()

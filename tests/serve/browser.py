@@ -39,7 +39,7 @@ class Page:
         number = next(self._numbers)
         await self._socket.send_json({"id": number, "method": method, "params": params})
         while True:
-            message = json.loads((await self._socket.receive(timeout=30)).data)
+            message = json.loads((await self._socket.receive(timeout=60)).data)
             if message.get("method") in {
                 "Runtime.consoleAPICalled",
                 "Runtime.exceptionThrown",
@@ -55,7 +55,7 @@ class Page:
         assert "exceptionDetails" not in answer, answer
         return answer["result"].get("value")
 
-    async def until(self, code: str, seconds: float = 20.0) -> None:
+    async def until(self, code: str, seconds: float = 60.0) -> None:
         """Wait for the page: a browser has no clock to inject."""
         for _ in range(int(seconds * 20)):
             if await self.eval(f"typeof by === 'function' && ({code})"):
@@ -104,7 +104,7 @@ async def opened(url: str, folder: Path) -> AsyncIterator[Page]:
 
 
 async def _port(file: Path) -> int:
-    for _ in range(400):
+    for _ in range(1200):
         if file.exists() and file.read_text().strip():
             return int(file.read_text().splitlines()[0])
         await asyncio.sleep(0.05)

@@ -31,7 +31,7 @@ async def open_doors(tmp_path: Path, **doors: object) -> AsyncIterator[Open]:
     if running.done():
         running.result()
     try:
-        async with aiohttp.ClientSession(timeout=aiohttp.ClientTimeout(10)) as web:
+        async with aiohttp.ClientSession(timeout=aiohttp.ClientTimeout(60)) as web:
             yield Open(server, surface, web, server.addresses["http"].rstrip("/"))
     finally:
         stop.set()

@@ -22,7 +22,7 @@ heard = []
 core = printcore()
 core.recvcb = lambda line: heard.append(line.strip())
 core.connect(sys.argv[1], 115200)
-online = wait(lambda: core.online, 15)
+online = wait(lambda: core.online, 60)
 program = gcoder.LightGCode(Path(sys.argv[2]).read_text().splitlines())
 core.startprint(program)
 sent = wait(lambda: not core.printing, 120)

@@ -81,7 +81,7 @@ def test_a_program_is_selected_then_started(tmp_path: Path) -> None:
 async def call(socket: aiohttp.ClientWebSocketResponse, method: str, **params: object) -> object:
     await socket.send_json({"jsonrpc": "2.0", "id": method, "method": method, "params": params})
     while True:
-        told = await socket.receive_json(timeout=10)
+        told = await socket.receive_json(timeout=60)
         if told.get("id") == method:
             return told.get("result", told.get("error"))
 
