@@ -29,7 +29,10 @@ def far_side(folder: Path) -> Iterator[list[str]]:
     """
     port, profile = folder / "machine", folder / "patient.toml"
     text = find("paper").read_text(encoding="utf-8")
-    profile.write_text(re.sub(r"(?m)^setpoint_watchdog_ms = .*$", "setpoint_watchdog_ms = 400.0", text))
+    for key, patient in (("setpoint_watchdog_ms", 400.0), ("heartbeat_ms", 5000.0)):
+        text, found = re.subn(rf"(?m)^{key} = .*$", f"{key} = {patient}", text)
+        assert found == 1
+    profile.write_text(text)
     with (folder / "sim.txt").open("w") as out:
         sim = subprocess.Popen(
             [

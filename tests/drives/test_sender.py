@@ -31,9 +31,13 @@ from cdhr_host.values import Feedback, Setpoints
 ROOT = Path(__file__).resolve().parents[2]
 ZERO = np.zeros(6)
 PATIENT = PAPER.model_copy(
-    update={"canopen": PAPER.canopen.model_copy(update={"jitter_test": 0.1, "setpoint_watchdog": 0.1})}
+    update={
+        "canopen": PAPER.canopen.model_copy(
+            update={"jitter_test": 0.1, "setpoint_watchdog": 0.1, "heartbeat": 2.0}
+        )
+    }
 )
-"""a machine for a computer that runs tests besides"""
+"""a machine for a computer that runs tests besides: whole processes may stand still for moments"""
 
 
 class Far:
