@@ -19,6 +19,13 @@ settings.load_profile("busy")  # how busy the computer is meanwhile says nothing
 HERE = Path(__file__).parent
 TRACED = {"program", "mechanism", "motion", "extrusion", "control", "plant", "samples", "pipeline", "laws"}
 """the pure rooms' own tests, of which a share of covered lines is asked; tracing would slow others down"""
+UPSTAIRS = {"test_hostile_doors.py", "test_playback_laws.py", "test_serve_laws.py"}
+"""laws of other rooms"""
+
+
+def traced(item: pytest.Item) -> bool:
+    """Whether coverage is asked of this test."""
+    return item.path.relative_to(HERE).parts[0] in TRACED and item.path.name not in UPSTAIRS
 
 
 @pytest.hookimpl(wrapper=True)
@@ -29,7 +36,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object
     other (its own and that of its parent's arguments): both are stopped, or nothing is won.
     """
     stopped: list[Coverage] = []
-    while item.path.relative_to(HERE).parts[0] not in TRACED and (tracing := Coverage.current()):
+    while not traced(item) and (tracing := Coverage.current()):
         tracing.stop()
         stopped.append(tracing)
     try:
