@@ -1,9 +1,10 @@
 """How far the rounding of each corner may reach along the straights beside it.
 
 A corner needs little more than the way from its feed to rest. Where a straight is long enough, both its
-corners have what they need; else they share it evenly, unless one of them is a gentle turn that has no use for
-it. So a corner's room depends on no more of the path than twice that. A straight goes on over points that are no corners. Where the feed changes on it nearer to a
-corner than what that can make use of, the corner keeps to the lower of both feeds, up to the next change.
+corners have what they need; else they share it evenly, unless one of them is a gentle turn that has no use
+for it. So a corner's room depends on no more of the path than twice that. A straight goes on over points that
+are no corners. Where the feed changes on it nearer to a corner than what that can make use of, the corner
+keeps to the lower of both feeds, up to the next change.
 """
 
 from dataclasses import dataclass
