@@ -41,6 +41,7 @@ TOUCHING = 1e-9
 """m and rad: equal but for rounding, which must not decide what is moved."""
 TOGETHER = 4
 """Sharp corners that may become one, at most."""
+TINY = np.finfo(float).tiny
 SLANTED = 4.0
 """half-widths, the longest side step between two sharp corners that is drawn slanted."""
 SLANTS = tuple(2.0 * 0.9**k for k in range(22))
@@ -165,13 +166,21 @@ def _slanted(drawn: _Drawn, like: Flags, h: float, spent: Array) -> _Drawn:
         way = part * h
         begin, end = drawn.points[first] - way * ahead, drawn.points[first + 1] + way * after
         slant = units(end - begin)
-        off = np.maximum(way * norms(np.cross(ahead, slant)), way * norms(np.cross(after, slant)))
+        step = drawn.points[first], drawn.points[first + 1]
+        off = np.maximum(*(_apart(each, begin, end) for each in step))
         gentle = np.maximum(norms(slant - ahead), norms(after - slant)) <= np.minimum(GENTLER * before, ACUTE)
         good = left & gentle & (off <= SPENT * h) & (way <= most)
         points[first[good]], points[first[good] + 1] = begin[good], end[good]
         spent[first[good]] = spent[first[good] + 1] = off[good]
         left &= ~good
     return _Drawn.of(points, drawn.sharp)
+
+
+def _apart(points: Array, begin: Array, end: Array) -> Array:
+    """(N, 3) -> (N,) m: distance from the straights between two points each, to be passed between these."""
+    way, along = points - begin, end - begin
+    part = np.clip((way * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), TINY), 0.0, 1.0)
+    return norms(way - part[:, None] * along)
 
 
 def _steps(drawn: _Drawn, like: Flags, h: float) -> Ints:
