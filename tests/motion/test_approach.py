@@ -8,7 +8,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from motion_tracks import distance_to, moves, norm
 
-from cdhr_host.motion import approach, corner, leg
+from cdhr_host.motion import approach, beside, corner, leg
 from cdhr_host.motion.approach import SPENT, straightened
 from cdhr_host.motion.beside import Allowance
 from cdhr_host.motion.limits import MotionLimits
@@ -106,7 +106,8 @@ def test_two_corners_at_a_speck_become_one():
 def test_a_corner_between_curves_takes_less_time(monkeypatch):
     points = curves([0.0, 1.5], [0.05, 0.05], [1e-3, 1e-3])
     better = _time(points)
-    monkeypatch.setattr(approach, "SHARP", 9.0)
+    for room in (approach, beside):
+        monkeypatch.setattr(room, "SHARP", 9.0)
     assert better < _time(points) - 0.05
 
 
