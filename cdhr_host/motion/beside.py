@@ -97,6 +97,8 @@ class Beside:
     pace: "Paces"
     shared: Flags
     """(2, K) whether the straight is too short for all that both its ends can make use of"""
+    held: Flags
+    """(2, K) whether it is, and what lies beyond it does not leave the nozzle free to change its speed"""
     ways: Array
     """(M,) m of straight that a corner can make use of on each segment"""
     least: float
@@ -133,9 +135,11 @@ def beside(drawn: Array, corner: Ints, turn: Array, *, least: float, allowed: Al
     between = np.diff(at, prepend=drawn[0], append=drawn[-1])
     both = np.concatenate((ways[:1], needed[1])), np.concatenate((needed[0], ways[-1:]))
     short = between < both[0] + both[1]
-    room = _rooms(between, _yielding(both, turn, pace.feed.max(axis=0), 2 * least, allowed), least)
-    shared = np.stack((short[:-1], short[1:]))
-    return Beside(at, needed, room, pace.within(room), shared, ways, least)
+    less = _yielding(both, turn, pace.feed.max(axis=0), 2 * least, allowed)
+    room, shared = _rooms(between, less, least), np.stack((short[:-1], short[1:]))
+    yielded = np.stack((less[0] < both[0], less[1] < both[1]))
+    held = shared & ~np.stack((yielded[0, :-1], yielded[1, 1:]))
+    return Beside(at, needed, room, pace.within(room), shared, held, ways, least)
 
 
 def _yielding(

@@ -131,7 +131,7 @@ def roundings(
     pace = around.pace
     limits = np.multiply.outer(np.array([allowed.acceleration, allowed.jerk]), pace.share.min(axis=0))
     found = Corners(
-        single.turn, pace.even, pace.feed, pace.feed, limits, widths.own, widths.swings, around.shared
+        single.turn, pace.even, pace.feed, pace.feed, limits, widths.own, widths.swings, around.held
     )
     which = _worthwhile(half, found, single.alone & ~chords, allowed)
     if not len(which):

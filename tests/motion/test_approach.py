@@ -108,7 +108,7 @@ def test_a_corner_between_curves_takes_less_time(monkeypatch):
     better = _time(points)
     for room in (approach, beside):
         monkeypatch.setattr(room, "SHARP", 9.0)
-    assert better < _time(points) - 0.05
+    assert better < _time(points) - 0.03
 
 
 def test_three_corners_at_a_speck_become_one_on_the_side_that_is_driven_alike():
