@@ -214,7 +214,6 @@ def _replaced(found: Rounding, which: Ints, swings: Swings) -> Inner:
     found.half[:, which] = length[:middle].sum(axis=0), length[middle:].sum(axis=0)
     found.saved[:, which] = found.half[:, which] - swings.reach
     found.gear[:, which], found.steep[:, which] = swings.speed / speed, swings.peak / speed
-    found.jump[:, which] = (found.gear[:, which] - 1.0) * np.array([[1.0], [-1.0]])
     step = np.diff(third, axis=1, prepend=0.0, append=0.0)
     found.step[:, :, which] = step[:, [0, middle, -1]].swapaxes(0, 1)
     found.shaped[which] = True

@@ -74,7 +74,6 @@ def put(found: Rounding, corner: Ints, length: Array, ways: Ways) -> Rounding:
     )
     first, last = ways.speed / speed
     found.gear[:, both] = _sides((first, first), (last, last))
-    found.jump[:, both] = _sides((first - 1, 0 * first), (0 * last, 1 - last))
     one, two, three = ways.peak / speed
     found.steep[:, both] = _sides((one, two), (two, three))
     found.step[:, :, both] = 0.0

@@ -41,8 +41,6 @@ class Rounding:
     """(2, K) m, by which each half is longer than the drawn way it stands for"""
     gear: Array
     """(2, K) |q'| where its shape begins and where that ends; two corners may share one"""
-    jump: Array
-    """(2, K) by which |q'| jumps where it begins and where it ends"""
     steep: Array
     """(2, K) greatest |q'| in each half"""
     step: Array
@@ -62,5 +60,4 @@ def kernels(half: Array) -> Rounding:
     nowhere, at = np.zeros(0, dtype=np.intp), np.zeros(0)
     inner, spatial = Inner(nowhere, at, np.zeros((2, 0))), Spatial(nowhere, at, np.zeros((0, 3)))
     shaped, follows = np.zeros((2, len(half)), dtype=np.bool_)
-    both, jump = np.stack((half, half)), none.copy()
-    return Rounding(both, none, one, jump, one.copy(), step, shaped, follows, inner, spatial)
+    return Rounding(np.stack((half, half)), none, one, one.copy(), step, shaped, follows, inner, spatial)

@@ -324,8 +324,10 @@ def _places(middle: Array, rounding: Rounding) -> list[NDArray[np.longdouble]]:
 
 def _jumps(turns: tuple[Array, Array], rounding: Rounding, rest: int) -> Array:
     """(E, 3): by how much q' jumps at ends, begins and middles, and at the ``rest``."""
-    (before, after), (first, final) = turns, rounding.jump[:, :, None]
-    return np.concatenate((final * after, first * before, 0 * before, np.zeros((rest, 3))))
+    (before, after), (first, final), follows = turns, rounding.gear, rounding.follows
+    begins = np.where(follows, 0.0, first - 1)[:, None]
+    ends = np.where(np.append(follows[1:], False), 0.0, 1 - final)[:, None]
+    return np.concatenate((ends * after, begins * before, 0 * before, np.zeros((rest, 3))))
 
 
 def _steps(turns: tuple[Array, Array], rounding: Rounding, also: int) -> Array:

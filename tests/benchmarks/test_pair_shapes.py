@@ -17,7 +17,7 @@ def driven(way, row):
     """Places, speeds, accelerations, jerks (N, 3) of a row (88,), and the piece of each, by small steps."""
     lasting = np.repeat(row[:3] / PIECES, PIECES)
     piece = np.repeat(np.arange(len(lasting)), STEPS)
-    jerk, t = row[4:].reshape(-1, 3)[piece][:, [0, 1, 2]], (lasting / STEPS)[piece, None]
+    jerk, t = row[4:].reshape(-1, 3)[piece], (lasting / STEPS)[piece, None]
     bend = np.cumsum(jerk * t, axis=0)
     speed = way.directions[0] * way.speeds[0] + np.cumsum((bend - jerk * t / 2) * t, axis=0)
     place = -row[3] * way.directions[0] + np.cumsum((speed - bend * t / 2 + jerk * t**2 / 6) * t, axis=0)

@@ -11,8 +11,8 @@ from motion_tracks import distance_to, moves, norm
 from cdhr_host.motion import paired
 from cdhr_host.motion.beside import Allowance
 from cdhr_host.motion.limits import MotionLimits
-from cdhr_host.motion.pair_shapes import PIECES, table
-from cdhr_host.motion.pairs import INSIDE, Ways
+from cdhr_host.motion.pair_shapes import Pairs, table
+from cdhr_host.motion.pairs import INSIDE, Ways, passed
 from cdhr_host.motion.planner import Planner
 from cdhr_host.motion.smooth_path import smooth
 
@@ -154,8 +154,9 @@ def test_what_is_no_pair_is_none():
     assert not is_pair(path_of(-hop(40, 4e-3)[::-1][:, [2, 1, 0]], feeds))
     row = np.array([[0, 0, 0], [40, 0, 0], [40, 4, 0], [36, 4, 0], [36, 8, 0], [80, 8, 0]]) * 1e-3
     path = path_of(row, [0.05] * 5)
-    assert np.flatnonzero(path.gear[0]).size
-    assert not (np.diff(path.segment[path.gear[0] > 0]) == 0).sum() >= sum(PIECES) - 3
+    shaped = np.flatnonzero(path.gear[0])
+    shapes = np.split(shaped, np.flatnonzero(np.diff(shaped) > 1) + 1)
+    assert [len(set(path.segment[each])) for each in shapes] == [2] * 4
 
 
 def test_a_change_of_feed_between_both_corners_leaves_them_alone():
@@ -164,10 +165,24 @@ def test_a_change_of_feed_between_both_corners_leaves_them_alone():
     assert not is_pair(path_of(points, (0.03, 0.05, 0.02, 0.05)))
 
 
-def test_what_is_between_the_tables_own_shapes_nearly_keeps_the_limits():
-    """Else much would be slowed down: it is within 3 % of the table's own, whose limits are 1."""
-    held = table()
-    for rows in (held.floor, held.flat):
-        jerk = norm(rows[..., 4:].reshape(-1, 3))
-        assert np.nanmax(jerk) <= 1.001
-        assert np.isnan(rows[..., 0]).mean() < 0.02
+def test_the_tables_own_shapes_keep_the_limits():
+    for rows in (table().floor, table().flat):
+        assert np.isfinite(rows).all()
+        assert norm(rows[..., 4:].reshape(-1, 3)).max() <= 1.001
+
+
+@pytest.mark.parametrize("rises", [False, True])
+def test_what_is_between_the_tables_own_shapes_needs_little_slowing_down(rises):
+    """Jerk or acceleration is at its limit or nearly, and the nozzle begins nearly at its feed."""
+    rng, count = np.random.default_rng(3), 300
+    angle = rng.uniform(0, np.pi, count) if rises else np.pi * rng.integers(2, size=count)
+    one, none = np.ones(count), np.zeros(count)
+    direction = np.array([[one, none, none], [none, none, one], [np.cos(angle), np.sin(angle), none]])
+    feed = np.stack((rng.uniform(4e-3, 0.1, count), 1.0 * one, rng.uniform(4e-3, 0.1, count)))
+    limits, floor = np.stack((A * one, J * one)), np.full(count, rises)
+    length, room = rng.uniform(2e-3, 10e-3, count), np.ones((2, count))
+    ways = passed(Pairs(direction, length, room, feed, limits, H / 3 * one, floor, np.zeros_like(floor)))
+    assert np.isfinite(ways.duration).all()
+    assert np.median(ways.speed / feed[[0, 2]]) > 0.985
+    assert np.quantile(ways.speed / feed[[0, 2]], 0.05) > 0.9
+    assert (ways.speed <= feed[[0, 2]] * (1 + 1e-9)).all()
